@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from functools import wraps
-from inspect import isgeneratorfunction
+from inspect import isgenerator
 from typing import Any, TypeVar
 
 from adv2e.errors import Adv2eError
@@ -54,16 +54,17 @@ def reworded(function: Function) -> Function:
         problems = getattr(found, "problems", None)
         if isinstance(problems, list):
             problems[:] = map(in_python, problems)
-        return found
+        return _generated(found) if isgenerator(found) else found
 
-    @wraps(function)
-    def generate(*arguments: Any, **named: Any) -> Iterator[Any]:
-        try:
-            yield from function(*arguments, **named)
-        except Adv2eError as error:
-            error.args = (in_python(str(error)),)
-            raise
-
-    made: Any = generate if isgeneratorfunction(function) else call
+    made: Any = call
     made.__module__ = "adv2e"  # where pickle finds it
     return made  # type: ignore[no-any-return]
+
+
+def _generated(found: Iterator[Any]) -> Iterator[Any]:
+    """Yield from a generator whose errors name arguments."""
+    try:
+        yield from found
+    except Adv2eError as error:
+        error.args = (in_python(str(error)),)
+        raise

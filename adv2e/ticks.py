@@ -88,3 +88,8 @@ def check_us(times_us: NDArray[np.int64], label: str) -> None:
     if times_us.size:
         for extreme in (times_us.min(), times_us.max()):
             check_time(int(extreme) * US, label)
+
+
+def microseconds(t_ns: Any) -> Any:
+    """Return times of frames, a number or an array, in the unit of events, rounded as theirs."""
+    return (t_ns + 500) // 1000

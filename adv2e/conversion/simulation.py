@@ -21,15 +21,16 @@ from adv2e.effects.frames.brightness import bounded, check_floats
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Frames, Hooks
 from adv2e.effects.reorder_buffer import InOrder
-from adv2e.errors import Adv2eWarning, DataError
-from adv2e.events import Events
+from adv2e.errors import Adv2eWarning, DataError, UsageError
+from adv2e.events import Events, empty_events
 from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.intervals import Intervals
 from adv2e.light.sensor import fitting_of
 from adv2e.pixel.array import PixelArray
 from adv2e.pixel.steps import PRECISE, Coarseness
+from adv2e.process import bars
 from adv2e.sources.frame import Pixels, check_values, light_of_images
-from adv2e.sources.times.rates import NS_PER_S, FrameRate, parse_rate
+from adv2e.sources.times.rates import NS_PER_S, FrameRate, Rate, parse_rate
 from adv2e.ticks import check_time
 
 _FAR_APART_S = 10.0
@@ -38,14 +39,18 @@ _FAR_APART_S = 10.0
 
 def simulate(
     frames: Iterable[NDArray[Any]],
-    times: Iterable[float] | float,
+    times: Iterable[float] | float | None = None,
     config: Written | Sequence[Written] | None = None,
     *,
+    fps: Rate | None = None,
+    seed: int | None = None,
+    size: tuple[int, int] | None = None,
     effects: Sequence[Hooks] = (),
     threads: int | None = None,
     causes: bool = False,
+    progress: bool = False,
 ) -> Iterator[Events]:
-    """Yield the events of a sequence of frames, sorted, chunk by chunk.
+    """Return an iterator over the events of a sequence of frames, sorted, chunk by chunk.
 
     Parameters
     ----------
@@ -53,10 +58,16 @@ def simulate(
         uint8, uint16, float32 or float64; colour as RGB.  `frames.encoding: auto` means sRGB for 8
         bits and linear for others.  With a `sensor` in the configuration they are brought to its
         size, which is that of the events.
-    times : iterable of float, or float
+    times : iterable of float, or float, optional
         Time of each frame [s], increasing; or so many frames a second, the first at 0.
     config : Config, or what :func:`adv2e.load_config` takes, optional
         Default: the shipped ``adv2e.yaml``.
+    fps : float, Fraction or str, optional
+        Frames a second, the first at 0, in place of `times`.
+    seed : int, optional
+        Seed of all random numbers; default: that of the configuration.
+    size : (int, int), optional
+        Width and height of the sensor [pixels], as ``sensor`` in the configuration.
     effects : sequence of Hooks, optional
         Effects of your own, besides those of the configuration.
     threads : int, optional
@@ -64,17 +75,23 @@ def simulate(
     causes : bool
         Give each event one more field, ``cause``: the number in :data:`adv2e.causes.CAUSES` of
         what made it.
+    progress : bool
+        Show a progress bar on stderr.
 
-    Yields
-    ------
-    events : (n,) array of EVENT_DTYPE
-        Times in us on the clock of `times`.
+    Returns
+    -------
+    iterator over (n,) arrays of EVENT_DTYPE
+        Times in us on the clock of `times`.  None of them is empty, but for a single one where
+        there is no event at all, so that ``np.concatenate(list(...))`` always works.
 
     Raises
     ------
     DataError
         Fewer than two frames, times that do not increase, frames of different sizes or types, NaN,
-        another number of times than frames where both have a length, a rate that cannot be.
+        another number of times than frames, a rate that cannot be, neither times nor a rate, or
+        both.  What the arguments and the first frame show is raised at once.
+    UsageError
+        `threads` is no whole number from 1 on.
     ConfigError
         As :func:`adv2e.load_config`; effects whose causes cannot be told apart.
 
@@ -90,16 +107,19 @@ def simulate(
     >>> import numpy as np
     >>> from adv2e import simulate
     >>> frames = [np.full((4, 6, 3), dn, np.uint8) for dn in (50, 80, 130, 200)]
-    >>> events = np.concatenate(list(simulate(frames, 100)))  # 100 frames a second
+    >>> events = np.concatenate(list(simulate(frames, fps=100)))
     >>> times = [0.0, 0.01, 0.02, 0.03]  # seconds
     >>> sum(map(len, simulate(frames, times, "adv2e"))) == len(events) > 0
     True
     """
-    config = config if isinstance(config, Config) else load_config(config)
-    instants = _instants(times)
-    if isinstance(frames, Sized) and isinstance(times, Sized) and len(frames) != len(times):
-        raise DataError(f"{len(times)} times for {len(frames)} frames")
+    if not isinstance(config, Config) or seed is not None or size is not None:
+        config = load_config(config, seed=seed, size=size)
+    _check_threads(threads)
+    instants, has_rate = _instants(times, fps)
+    _check_numbers(frames, times)
     hooks = active_hooks(config, effects)
+    if causes:
+        check_causes(hooks)
     coming = iter(frames)
     first = next(coming, None)
     if first is None:
@@ -108,28 +128,76 @@ def simulate(
     rows, columns = np.shape(first)[:2]
     fitting = fitting_of(columns, rows, config.sensor, "frame 0")
     table = kernel_table(decoder, config.sampling, hooks, fitting)
-    images = _checked(itertools.chain([first], coming), instants, config.frames.full_scale)
+    count = len(frames) if isinstance(frames, Sized) else None
+    images = _checked(
+        itertools.chain([first], coming), instants, config.frames.full_scale, has_rate=has_rate
+    )
     light = images if table is not None else ((t, decoder.decode(image)) for t, image in images)
     if fitting is not None:
         light = (
             (t, fitting.light(now, f"frame {number}")) for number, (t, now) in enumerate(light)
         )
-    yield from events_from_light(
-        light, config, hooks=hooks, threads=threads, table=table, causes=causes
+    made = events_from_light(
+        _shown(light, count) if progress else light,
+        config,
+        hooks=hooks,
+        threads=threads,
+        table=table,
+        causes=causes,
     )
+    return _filled(made)
 
 
-def _instants(times: Any) -> Iterable[float]:
-    """Return the time of each frame [s], which are given, or their rate is."""
+def _check_numbers(frames: object, times: object) -> None:
+    if isinstance(frames, Sized) and isinstance(times, Sized) and len(frames) != len(times):
+        raise DataError(f"{len(times)} times for {len(frames)} frames")
+
+
+def _check_threads(threads: Any) -> None:
+    if threads is not None and not (isinstance(threads, (int, np.integer)) and threads >= 1):
+        raise UsageError(f"threads: must be a whole number from 1 on, got {threads!r}")
+
+
+def _filled(chunks: Iterator[Events]) -> Iterator[Events]:
+    """Yield the chunks that hold events; an empty one if none does."""
+    is_any, nothing = False, empty_events()
+    for chunk in chunks:
+        if chunk.size:
+            is_any = True
+            yield chunk
+        else:
+            nothing = chunk
+        del chunk  # or it would stay while the next one is made
+    if not is_any:
+        yield nothing
+
+
+def _shown(
+    light: Iterable[tuple[int, NDArray[Any]]], count: int | None
+) -> Iterator[tuple[int, NDArray[Any]]]:
+    """Yield the frames, with a progress bar on stderr."""
+    with bars.bar(total=count, unit=" frames") as bar:
+        for frame in light:
+            bar.update()
+            yield frame
+
+
+def _instants(times: Any, fps: Rate | None) -> tuple[Iterable[float], bool]:
+    """Return the time of each frame [s], and whether a rate gives them, so that they never end."""
+    if fps is not None and times is not None:
+        raise DataError("times, fps: give one of them, the times of the frames or their rate")
     if isinstance(times, Iterable) and not isinstance(times, (str, bytes)):
-        return times
-    if not isinstance(times, (int, float, np.number)):
-        raise DataError(f"times: must be the time of each frame [s] or a rate [Hz], got {times!r}")
+        return times, False
+    name, given = ("times", times) if fps is None else ("fps", fps)
+    if fps is None and not isinstance(times, (int, float, np.number)):
+        raise DataError(
+            f"times: must be the time of each frame [s] or a rate [Hz], got {times!r}; or give fps"
+        )
     try:
-        rate = FrameRate(parse_rate(str(times)))
+        rate = FrameRate(parse_rate(str(given)))
     except ValueError as error:
-        raise DataError(f"times: a rate {error}") from None
-    return (rate.time_ns(number) / NS_PER_S for number in itertools.count())
+        raise DataError(f"{name}: a rate {error}") from None
+    return (rate.time_ns(number) / NS_PER_S for number in itertools.count()), True
 
 
 def _tell_far_apart(apart_s: float) -> None:
@@ -143,9 +211,13 @@ def _tell_far_apart(apart_s: float) -> None:
 
 
 def _checked(
-    frames: Iterable[NDArray[Any]], times: Iterable[float], full_scale: float | None
+    frames: Iterable[NDArray[Any]],
+    times: Iterable[float],
+    full_scale: float | None,
+    *,
+    has_rate: bool,
 ) -> Iterator[tuple[int, NDArray[Any]]]:
-    """Yield time [ns] and numbers of each frame."""
+    """Yield time [ns] and numbers of each frame; with a rate, there are always more times."""
     coming = iter(times)
     first: NDArray[Any] | None = None
     began_s = 0.0
@@ -170,6 +242,8 @@ def _checked(
         check_values(image, label)
         check_floats(image, label, full_scale)
         yield round(t_s * 1e9), image
+    if not has_rate and next(coming, None) is not None:
+        raise DataError(f"more times than frames, of which there are {number + 1}")
 
 
 def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
+from html import escape
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.events import Events
+from adv2e.files.names import shown
 from adv2e.sources.frame import Frame, Image, Light, Pixels, as_pixels, odd_white
 from adv2e.sources.stored import recorded_light
+from adv2e.ticks import microseconds
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Recording:
-    """The content of an event file.
+    """The content of an event file; its length is the number of events.
+
+    ``recording[0.5:1.0]`` is the part from 0.5 s to 1 s after its first event or frame.
 
     Attributes
     ----------
@@ -52,6 +60,89 @@ class Recording:
     problems: list[str] = field(default_factory=list)
     images: Callable[[], Iterator[Image | Pixels]] = field(default=lambda: iter(()), repr=False)
     inputs: list[str | Path] = field(default_factory=list, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.events)
+
+    def __bool__(self) -> bool:
+        return True  # also without events
+
+    @property
+    def start_us(self) -> int:
+        """Time of the first event or frame [us]; 0 without any."""
+        return self._span_us()[0]
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first event or frame to the last one [s]; 0 without any."""
+        first, last = self._span_us()
+        return (last - first) * 1e-6
+
+    def _span_us(self) -> tuple[int, int]:
+        times = [self.events["t"][[0, -1]]] if self.events.size else []
+        if self.frame_times_ns is not None and self.frame_times_ns.size:
+            times.append(microseconds(self.frame_times_ns[[0, -1]]))
+        if not times:
+            return 0, 0
+        return min(int(pair[0]) for pair in times), max(int(pair[1]) for pair in times)
+
+    def __getitem__(self, part: slice) -> Recording:
+        """Return the part from `start` to before `stop` [s after the first event or frame].
+
+        Raises
+        ------
+        TypeError
+            It is no slice, or one with a step.
+        """
+        if not isinstance(part, slice) or part.step is not None:
+            raise TypeError("a recording takes a slice of seconds, such as recording[0.5:1.0]")
+        begin_us = self.start_us
+        low, high = (
+            None if time is None else begin_us + round(time * 1e6)
+            for time in (part.start, part.stop)
+        )
+        times = self.events["t"]
+        first = 0 if low is None else int(np.searchsorted(times, low))
+        last = len(self) if high is None else int(np.searchsorted(times, high))
+        kept = None
+        images = self.images
+        if self.frame_times_ns is not None:
+            at_us = microseconds(self.frame_times_ns)
+            inside = np.ones(len(at_us), bool) if low is None else at_us >= low
+            inside &= True if high is None else at_us < high
+            kept = self.frame_times_ns[inside]
+            images = partial(_chosen, self.images, inside.tolist())
+        return replace(
+            self, events=self.events[first : max(first, last)], frame_times_ns=kept, images=images
+        )
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write the events to a file; see :func:`adv2e.write_events`."""
+        from adv2e import write_events  # noqa: PLC0415 - which is above this module
+
+        write_events(path, self, overwrite=overwrite)
+
+    def __repr__(self) -> str:
+        frames = 0 if self.frame_times_ns is None else len(self.frame_times_ns)
+        return (
+            f"<Recording {shown(self.path)}: {len(self):,} events"
+            + (f", {frames:,} frames" if frames else "")
+            + f", {self.width}x{self.height} pixels, {self.duration_s:.3f} s>"
+        )
+
+    def _repr_html_(self) -> str:
+        """Return the same for notebooks, with a picture of its events."""
+        import cv2  # noqa: PLC0415 - for notebooks alone
+
+        from adv2e import render  # noqa: PLC0415 - which is above this module
+
+        text = f"<p>{escape(repr(self))}</p>"
+        if not (self.events.size and self.width and self.height):
+            return text
+        picture = render(self, count=1, frames=False)
+        assert picture is not None
+        data = cv2.imencode(".png", picture[:, :, ::-1])[1].tobytes()
+        return f'{text}<img src="data:image/png;base64,{b64encode(data).decode()}"/>'
 
     @property
     def light(self) -> Light:
@@ -99,3 +190,9 @@ class Recording:
             odd = "" if stored is not None else odd_white(pixels, first)
             label = f"{self.path}: frame {number}"
             yield Frame(t_ns, pixels.image, label, pixels.alpha, stored or first, odd)
+
+
+def _chosen(
+    images: Callable[[], Iterator[Image | Pixels]], inside: list[bool]
+) -> Iterator[Image | Pixels]:
+    return compress(images(), inside)

@@ -11,6 +11,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,18 @@ import numpy as np
 from adv2e import __version__
 from adv2e.background import default_threads
 from adv2e.causes import CAUSED_DTYPE, has_causes
+from adv2e.errors import Adv2eWarning, DataError
 from adv2e.events import EVENT_DTYPE, Events, checked_events
 from adv2e.files.staging import Staging
 from adv2e.formats.causes import check_numbers
 from adv2e.formats.lookup import to_write
+from adv2e.formats.recording import Recording
 from adv2e.formats.sink import Request, Sink
+
+_NO_FRAMES = (
+    "the frames of the recording are not written: 'adv2e convert IN -o OUT --from events"
+    " --with-frames' keeps them"
+)
 
 
 def open_sink(
@@ -95,8 +103,8 @@ def open_sink(
 
 def write_events(
     path: str | Path,
-    events: Events,
-    size: tuple[int, int],
+    events: Events | Recording,
+    size: tuple[int, int] | None = None,
     *,
     metadata: dict[str, Any] | None = None,
     overwrite: bool = False,
@@ -107,20 +115,22 @@ def write_events(
     ----------
     path : str or Path
         Output: its suffix tells the format; without one, a DAVIS240C folder.
-    events : structured array, (n,)
+    events : Recording, or structured array, (n,)
         With the fields t [us], x, y, p, in any order of time; sorted ones are written as they are.
-        The field cause, if there is one, is written too.
-    size : (int, int)
-        Width and height of the sensor [pixels].
+        The field cause, if there is one, is written too.  The frames of a recording are not:
+        ``adv2e convert IN -o OUT --from events --with-frames`` keeps them.
+    size : (int, int), optional
+        Width and height of the sensor [pixels]; an array needs it.
     metadata : dict, optional
         What JSON can hold; stored inside, or in ``<path>.json`` where a format cannot hold it.
+        Default: that of the recording.
     overwrite : bool
         Replace, at the end, what exists.
 
     Raises
     ------
     DataError
-        The array has other fields, or an event lies outside the sensor, or has no cause.
+        The array has other fields or no size, or an event lies outside the sensor, or has no cause.
     OutputError
         Unknown suffix; the output exists already, or cannot be made.
 
@@ -137,6 +147,15 @@ def write_events(
     >>> recording.events["t"].tolist(), recording.width, recording.height
     ([10, 20], 4, 3)
     """
+    recording = events if isinstance(events, Recording) else None
+    if recording is not None:
+        events, size = recording.events, size or (recording.width, recording.height)
+        if recording.frame_times_ns is not None:
+            warnings.warn(_NO_FRAMES, Adv2eWarning, stacklevel=3)  # of who calls adv2e.write_events
+        if metadata is None:
+            metadata = {key: value for key, value in recording.metadata.items() if key != "frames"}
+    if size is None:
+        raise DataError("events: size is missing, (width, height) of the sensor [pixels]")
     width, height = size
     caused = has_causes(np.asarray(events))
     ours = checked_events(events, width, height, CAUSED_DTYPE if caused else EVENT_DTYPE)

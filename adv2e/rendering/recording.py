@@ -15,7 +15,8 @@ from adv2e.light.pictures import drawn_frame
 from adv2e.process import bars
 from adv2e.rendering.preview import open_preview
 from adv2e.rendering.styles import Style
-from adv2e.rendering.timeline import MOST_PICTURES, Caption, Timeline, caption, microseconds
+from adv2e.rendering.timeline import MOST_PICTURES, Caption, Timeline, caption
+from adv2e.ticks import microseconds
 
 if TYPE_CHECKING:
     from adv2e.formats.reading import Recording
@@ -69,9 +70,13 @@ def render_recording(
         See :func:`open_preview`.
     """
     check_distinct(path, recording.inputs)
-    begin_us, until_us = _span_us(recording)
+    has_frames = recording.frame_times_ns is not None and recording.frame_times_ns.size > 0
+    if not (len(recording) or has_frames):
+        raise DataError(f"{recording.path}: holds no events and no frames")
+    begin_us = recording.start_us
+    until_us = begin_us + round(recording.duration_s * 1e6) + 1
     lasts = f"{recording.path}: lasts {(until_us - begin_us) * 1e-6:.3f} s"
-    frames = frames and recording.frame_times_ns is not None and recording.frame_times_ns.size > 0
+    frames = frames and has_frames
     if not (recording.width and recording.height):
         raise DataError(f"{recording.path}: nothing tells how large the sensor is")
     first_us = begin_us + round(start_s * 1e6)
@@ -107,16 +112,6 @@ def render_recording(
         max_pictures=max_pictures,
     ) as preview:
         _feed(preview, recording, first_us, until_us, frames, progress)
-
-
-def _span_us(recording: Recording) -> tuple[int, int]:
-    """Return the time of the first event or frame, and 1 us after the last [us]."""
-    times = [recording.events["t"][[0, -1]]] if recording.events.size else []
-    if recording.frame_times_ns is not None and recording.frame_times_ns.size:
-        times.append(microseconds(np.asarray(recording.frame_times_ns)[[0, -1]]))
-    if not times:
-        raise DataError(f"{recording.path}: holds no events and no frames")
-    return min(int(pair[0]) for pair in times), max(int(pair[1]) for pair in times) + 1
 
 
 def _feed(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,7 +24,7 @@ _SHEET_WINDOW_MS = 20.0
 
 def render(
     events: str | Path | Recording | NDArray[Any],
-    output: str | Path,
+    output: str | Path | None = None,
     *,
     size: tuple[int, int] | None = None,
     style: str = "white",
@@ -40,15 +42,15 @@ def render(
     overwrite: bool = False,
     progress: bool = False,
     max_pictures: int = MOST_PICTURES,
-) -> None:
+) -> NDArray[np.uint8] | None:
     """Draw a film (.mp4, .webm, .avi, .gif) or a sheet of pictures (.png) of events.
 
     Parameters
     ----------
     events : str, Path, Recording, or (n,) array of EVENT_DTYPE
         A file, what :func:`adv2e.read_events` returned, or the events themselves.
-    output : str or Path
-        File to write; its suffix says what to make.
+    output : str or Path, optional
+        File to write; its suffix says what to make.  Without one, a sheet is returned.
     size : (int, int), optional
         Width and height of the sensor [pixels].  An array needs it, nothing else takes it.
     style : {'white', 'black', 'grey', 'surface'}
@@ -79,6 +81,11 @@ def render(
     max_pictures : int
         Most pictures of a film: a wrong time would make far too many.
 
+    Returns
+    -------
+    (rows, columns, 3) array of uint8, or None
+        The sheet as RGB, where no file is named.
+
     Raises
     ------
     DataError
@@ -99,7 +106,32 @@ def render(
     ...     render(events, os.path.join(folder, "events.png"), size=(32, 24), count=2)
     ...     os.listdir(folder)
     ['events.png']
+    >>> render(events, size=(32, 24), count=1, scale=1).dtype
+    dtype('uint8')
     """
+    if output is None:
+        with tempfile.TemporaryDirectory(prefix="adv2e-render-") as folder:
+            sheet = Path(folder) / "events.png"
+            render(
+                events,
+                sheet,
+                size=size,
+                style=style,
+                on_color=on_color,
+                off_color=off_color,
+                window_ms=window_ms,
+                fps=fps,
+                speed=speed,
+                start_s=start_s,
+                stop_s=stop_s,
+                at_s=at_s,
+                count=count,
+                frames=frames,
+                scale=scale,
+                progress=progress,
+            )
+            picture: Any = cv2.imread(str(sheet))
+            return np.ascontiguousarray(picture[:, :, ::-1], np.uint8)
     chosen = chosen_style(
         output,
         style,
@@ -126,6 +158,7 @@ def render(
         progress=progress,
         max_pictures=max_pictures,
     )
+    return None
 
 
 def chosen_style(

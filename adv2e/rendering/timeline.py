@@ -21,6 +21,7 @@ from adv2e.light.pictures import eight_bit
 from adv2e.rendering.films import NotWritten, PictureOutput
 from adv2e.rendering.layout import Cell
 from adv2e.rendering.styles import Picture, Style, draw
+from adv2e.ticks import microseconds
 
 Caption = Callable[[int, int], str]
 """Text of a picture from its time since the start [us] and the number of events it shows."""
@@ -222,11 +223,6 @@ class Timeline:
         if self._shown is None:
             self._shown = np.full((self._size[1], self._size[0], 3), 128, np.uint8)
         return self._shown
-
-
-def microseconds(t_ns: Any) -> Any:
-    """Return times of frames, a number or an array, in the unit of events, rounded as theirs."""
-    return (t_ns + 500) // 1000
 
 
 def _reduced(image: NDArray[Any], size: tuple[int, int]) -> Picture:

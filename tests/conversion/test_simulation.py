@@ -11,7 +11,7 @@ from harness import quiet
 import adv2e
 from adv2e.config import Config
 from adv2e.config.model import Frames, Sampling
-from adv2e.errors import ConfigError, DataError
+from adv2e.errors import Adv2eError, ConfigError, DataError, UsageError
 from adv2e.events import is_sorted, sort_events
 from adv2e.light import intervals
 
@@ -111,6 +111,7 @@ def test_16_bits_are_linear_unless_told(channels):
         (frames(3), iter([0.0, 0.1]), "frame 2: has no time"),
         (frames(3), [0.0, 0.1], "2 times for 3 frames"),
         (frames(3), times(4), "4 times for 3 frames"),
+        (iter(frames(3)), iter(times(4)), "more times than frames, of which there are 3"),
         (frames(3), [0.0, np.nan, 0.2], "frame 1: its time is nan"),
         ([255.0 * np.ones((4, 4))] * 2, times(2), "floats up to 255, where 1 is white"),
         (frames(3), [0.0, 0.1, 0.1], "frame 2"),
@@ -148,6 +149,49 @@ def test_a_number_is_a_rate(rate):
 def test_a_rate_that_cannot_be_is_refused(rate):
     with pytest.raises(DataError, match=r"^times: "):
         run(frames(), rate)
+
+
+def test_a_rate_goes_by_its_name_too():
+    whole = run(frames(), times())
+    assert run(frames(), None, fps=30).tobytes() == whole.tobytes()
+    assert run(frames(), None, fps="30000/1001").tobytes() != whole.tobytes()
+    with pytest.raises(DataError, match=r"^times, fps: give one of them"):
+        run(frames(), times(), fps=30)
+    with pytest.raises(DataError, match=r"^fps: a rate "):
+        run(frames(), None, fps=-30)
+
+
+def test_seed_and_size_are_those_of_the_configuration():
+    whole = run(frames(), times())
+    assert run(frames(), times(), seed=7).tobytes() != whole.tobytes()
+    assert run(frames(), times(), seed=7).tobytes() == run(frames(), times(), {"seed": 7}).tobytes()
+    assert run(frames(), times(), size=(15, 10))["x"].max() < 15
+
+
+def test_arguments_are_checked_when_it_is_called():
+    for wrong in ({"times": -1}, {"fps": 30, "config": 3}, {"fps": 30, "threads": 0}):
+        with pytest.raises(Adv2eError):
+            adv2e.simulate(frames(), **wrong)
+    with pytest.raises(DataError, match="no frames"):
+        adv2e.simulate([], fps=30)
+    with pytest.raises(UsageError, match=r"threads: must be a whole number from 1 on, got 2\.5"):
+        adv2e.simulate(frames(), fps=30, threads=2.5)
+
+
+def test_no_chunk_is_empty_but_one_where_nothing_happens():
+    chunks = list(adv2e.simulate(frames(), fps=30))
+    assert chunks
+    assert all(map(len, chunks))
+    still = [np.full((4, 6), 0.5, np.float32)] * 5
+    (nothing,) = adv2e.simulate(still, fps=30, config=Config(pixel=quiet()), causes=True)
+    assert len(nothing) == 0
+    assert "cause" in nothing.dtype.names
+
+
+def test_progress_is_shown_on_standard_error(capsys):
+    shown = run(frames(), times(), progress=True)
+    assert shown.tobytes() == run(frames(), times()).tobytes()
+    assert "7" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("unit", "apart"), [(1e3, "33.3333"), (1e5, "3333.33")])
