@@ -8,9 +8,15 @@ read_events   a file of events -> Recording (events, sensor size, frames if ther
 write_events  events -> a file
 voxel_grid    events -> (bins, rows, columns), as networks take them
 render        events -> pictures and films
+compare       two recordings -> how far one is from the other
+info          any input -> what it holds
 diagnose      a real recording -> the effect that its simulation lacks
+Recording     events, sensor size and frames: what read_events returns
 EVENT_DTYPE   the record of an event: t [us], x, y, p (1 ON, 0 OFF)
 ============  ====================================================================================
+
+What users can mend is an Adv2eError: ConfigError, DataError, OutputError, UsageError or
+MissingExtraError.  What they may look at is an Adv2eWarning.
 
 The method is that of Jiang, Zhou, Lin: "ADV2E: Bridging the Gap Between Analogue Circuit and
 Discrete Frames in the Video-to-Events Simulator".
@@ -33,10 +39,20 @@ __version__ = "0.1.0"
 
 __all__ = [
     "EVENT_DTYPE",
+    "Adv2eError",
+    "Adv2eWarning",
     "Config",
+    "ConfigError",
+    "DataError",
+    "MissingExtraError",
+    "OutputError",
+    "Recording",
+    "UsageError",
     "__version__",
+    "compare",
     "convert",
     "diagnose",
+    "info",
     "load_config",
     "read_events",
     "render",
@@ -47,21 +63,43 @@ __all__ = [
 
 TYPE_CHECKING = False  # as in `typing`, which takes longer to import than all else here
 if TYPE_CHECKING:
+    from adv2e.comparison.compare import compare
     from adv2e.config import Config, load_config
     from adv2e.conversion.convert import convert
     from adv2e.conversion.simulation import simulate
     from adv2e.diagnosis.recordings import diagnose
+    from adv2e.errors import (
+        Adv2eError,
+        Adv2eWarning,
+        ConfigError,
+        DataError,
+        MissingExtraError,
+        OutputError,
+        UsageError,
+    )
     from adv2e.events import EVENT_DTYPE
     from adv2e.formats.reading import read_events
+    from adv2e.formats.recording import Recording
     from adv2e.formats.writing import write_events
+    from adv2e.inspection.inspect import info
     from adv2e.rendering.render import render
     from adv2e.representations.voxel_grid import voxel_grid
 
 _HOMES = {
     "EVENT_DTYPE": "adv2e.events",
+    "Adv2eError": "adv2e.errors",
+    "Adv2eWarning": "adv2e.errors",
     "Config": "adv2e.config",
+    "ConfigError": "adv2e.errors",
+    "DataError": "adv2e.errors",
+    "MissingExtraError": "adv2e.errors",
+    "OutputError": "adv2e.errors",
+    "Recording": "adv2e.formats.recording",
+    "UsageError": "adv2e.errors",
+    "compare": "adv2e.comparison.compare",
     "convert": "adv2e.conversion.convert",
     "diagnose": "adv2e.diagnosis.recordings",
+    "info": "adv2e.inspection.inspect",
     "load_config": "adv2e.config",
     "read_events": "adv2e.formats.reading",
     "render": "adv2e.rendering.render",

@@ -47,13 +47,13 @@ def command(
     names the program and the seed that made the file, if the file does. It reports problems: events
     out of order, repeated events, gaps, hot pixels. It reads a video to its end.
     """
-    from adv2e.inspection.inspect import inspect
+    from adv2e.inspection.inspect import info
 
     if size is not None and given["pixel_format"] is None:
         raise click.UsageError("--size is that of raw video, of which --pixel-format says the rest")
     log(f"reading {file}", 1)
     with reading_told(file, progress) as told:
-        report = inspect(file, **given, set_back=set_back, frame_size=size, progress=told)
+        report = info(file, **given, set_back=set_back, frame_size=size, progress=told)
     if as_json:
         import json
 

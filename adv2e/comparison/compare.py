@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from adv2e.comparison.offset import latency_offset_us
 from adv2e.comparison.windows import Windows, fixed_windows, frame_windows, span_of
 from adv2e.errors import DataError
 from adv2e.events import Events, Window, cut
+from adv2e.formats.reading import read_events
 from adv2e.formats.recording import Recording
 from adv2e.sources.times.rates import seconds
 
@@ -117,8 +119,8 @@ class Resimulation:
 
 
 def compare(
-    measured: Recording,
-    simulated: Recording,
+    measured: str | Path | Recording,
+    simulated: str | Path | Recording,
     *,
     frame_times_ns: NDArray[np.int64] | None = None,
     window_s: float | None = None,
@@ -128,8 +130,8 @@ def compare(
 
     Parameters
     ----------
-    measured, simulated : Recording
-        Two recordings of one size on one clock.
+    measured, simulated : str, Path or Recording
+        Two recordings of one size on one clock: files, or what :func:`adv2e.read_events` returned.
     frame_times_ns : array of int64, optional
         Times of the frames whose intervals are the windows [ns]; default: those of `measured`.
     window_s : float, optional
@@ -141,8 +143,21 @@ def compare(
     Raises
     ------
     DataError
-        Sizes differ, a stream is empty, or the streams have no whole window in common.
+        Sizes differ, a stream is empty, or the streams have no whole window in common; a file
+        cannot be read.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import adv2e
+    >>> frames = [np.full((24, 32), light, np.float32) for light in (0.1, 0.2, 0.4, 0.8)]
+    >>> one, other = (np.concatenate([*adv2e.simulate(frames, 100, seed=k)]) for k in (1, 2))
+    >>> one, other = (adv2e.Recording("array", "array", 32, 24, events) for events in (one, other))
+    >>> found = adv2e.compare(one, other, window_s=0.01)
+    >>> found["measures"]["relative_5_bins"]["value"] < 0.5
+    True
     """
+    measured, simulated = map(_read, (measured, simulated))
     spans = _spans(measured, simulated)
     times = measured.frame_times_ns if frame_times_ns is None else frame_times_ns
     if window_s is None and times is not None and len(times) > 1:
@@ -173,6 +188,10 @@ def compare(
         },
         "warning": WARNING,
     }
+
+
+def _read(stream: str | Path | Recording) -> Recording:
+    return read_events(stream) if isinstance(stream, (str, Path)) else stream
 
 
 def _spans(measured: Recording, simulated: Recording) -> list[Window]:

@@ -48,6 +48,15 @@ class Recording:
         Returns an iterator over the images of the frames.
     inputs : list of str or Path
         Files that were read, and are read again for the images.
+
+    Examples
+    --------
+    >>> from adv2e import Recording
+    >>> from adv2e.events import make_events
+    >>> events = make_events(t=[0, 600_000, 900_000], x=[3, 0, 1], y=[2, 1, 1], p=[1, 0, 1])
+    >>> recording = Recording("drive.h5", "array", 4, 3, events)
+    >>> recording[0.5:]
+    <Recording drive.h5: 2 events, 4x3 pixels, 0.300 s>
     """
 
     path: str

@@ -25,11 +25,11 @@ from adv2e.sources.stored import EVENTS, LIST
 from adv2e.sources.times.rates import Rate
 
 
-def inspect(
-    path: Path,
+def info(
+    path: str | Path,
     *,
     fps: Rate | None = None,
-    timestamps: Path | None = None,
+    timestamps: str | Path | None = None,
     time_unit: str | None = None,
     allow_damaged: bool = False,
     bayer: str | None = None,
@@ -44,7 +44,7 @@ def inspect(
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         Any file or folder that can be compared or converted.
     fps, timestamps
         Times of frames, see :func:`adv2e.sources.open_source`; for inputs without events.
@@ -70,7 +70,20 @@ def inspect(
     ------
     DataError
         The file is missing, of an unknown kind, or cannot be read.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> from adv2e import info, write_events
+    >>> from adv2e.events import make_events
+    >>> events = make_events(t=[10, 20], x=[0, 3], y=[0, 2], p=[1, 0])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_events(os.path.join(folder, "a.h5"), events, (4, 3))
+    ...     found = info(os.path.join(folder, "a.h5"))
+    >>> found["width"], found["height"], found["events"]["count"]
+    (4, 3, 2)
     """
+    path = Path(path)
     check_ends(path)
     if str(path) == STDIN or _has_only_frames(path):
         source = open_source(

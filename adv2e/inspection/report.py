@@ -12,7 +12,7 @@ _WIDTH = 12
 
 
 def text(report: dict[str, Any]) -> str:
-    """Return the dictionary of :func:`adv2e.inspection.inspect.inspect` as lines of text."""
+    """Return the dictionary of :func:`adv2e.info` as lines of text."""
     return "\n".join(f"{name:<{_WIDTH}}{shown(value)}" for name, value in _rows(report))
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from adv2e.errors import DataError
 from adv2e.formats.reading import read_events
-from adv2e.inspection.inspect import inspect
+from adv2e.inspection.inspect import info
 from adv2e.sources import open_source
 
 HUGE = 300 << 20
@@ -83,7 +83,7 @@ def test_archives_cut_short(tmp_path, part, kind):
     else:
         np.savez_compressed(path, t_us=[1, 2], x=[1, 1], y=[1, 1], p=[1, 0])
     path.write_bytes(path.read_bytes()[: int(part * path.stat().st_size)])
-    for read in (read_events, inspect, open_source):
+    for read in (read_events, info, open_source):
         with pytest.raises(DataError, match=rf"a\.{kind}"):
             read(path)
 
