@@ -19,7 +19,6 @@ from adv2e.diagnosis.configurations import (
 )
 from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.fitting.nuisances import thresholds_of
-from adv2e.diagnosis.outcome.conclusion import conclude
 from adv2e.diagnosis.outcome.detectable import detectable
 from adv2e.diagnosis.outcome.findings import (
     about_drifts,
@@ -28,12 +27,11 @@ from adv2e.diagnosis.outcome.findings import (
     rejected_of,
     signatures_of,
 )
-from adv2e.diagnosis.outcome.verdict import remark_of
+from adv2e.diagnosis.outcome.verdict import conclude, remark_of
 from adv2e.diagnosis.prepare import DECLARED, prepare
 from adv2e.diagnosis.selection.search import Search
 from adv2e.diagnosis.simulation.affordable import affordable
-from adv2e.diagnosis.simulation.progress import Progress
-from adv2e.diagnosis.simulation.simulator import Simulator
+from adv2e.diagnosis.simulation.simulator import Progress, Simulator
 from adv2e.reports.result import Diagnosis
 
 
@@ -74,7 +72,7 @@ def diagnose(
     threads : int, optional
         Simulations at a time; default: all cores.  The result does not depend on it.
     progress : callable
-        Called with a :class:`~adv2e.diagnosis.simulation.progress.Progress`, the stage and the
+        Called with a :class:`~adv2e.diagnosis.simulation.simulator.Progress`, the stage and the
         number of simulations done, at each new stage and after each simulation.
     log : callable
         Takes lines for people.

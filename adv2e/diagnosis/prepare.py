@@ -27,8 +27,7 @@ from adv2e.diagnosis.hints.readouts import has_pulse
 from adv2e.diagnosis.selection.reference import Reference
 from adv2e.diagnosis.simulation.simulator import Simulator
 from adv2e.diagnosis.statistics.rates import since_burst
-from adv2e.diagnosis.statistics.sampler import Sampler
-from adv2e.diagnosis.statistics.summary import SummaryStatistics
+from adv2e.diagnosis.statistics.summary import Sampler, SummaryStatistics
 from adv2e.diagnosis.statistics.uncertainty import (
     PILOT_SEEDS,
     FrameError,

@@ -18,9 +18,9 @@ from adv2e import load_config, simulate
 from adv2e.diagnosis import prepare
 from adv2e.diagnosis import recordings as whole
 from adv2e.diagnosis.fitting.library import names
-from adv2e.diagnosis.outcome import conclusion
+from adv2e.diagnosis.outcome import verdict
 from adv2e.diagnosis.selection import reference, shortlist
-from adv2e.diagnosis.simulation.progress import Progress
+from adv2e.diagnosis.simulation.simulator import Progress
 from adv2e.formats.writing import open_sink
 from adv2e.geometry import Rectangle
 from adv2e.reports import summary
@@ -64,7 +64,7 @@ def short(monkeypatch):
     for module in (reference, shortlist):
         monkeypatch.setattr(module, "SOME", 16)
     monkeypatch.setattr(prepare, "PILOT_SEEDS", range(10_000, 10_004))
-    monkeypatch.setattr(conclusion, "DRAWS", 4)
+    monkeypatch.setattr(verdict, "DRAWS", 4)
 
 
 def found(adv2e, recordings, name, out, *options):

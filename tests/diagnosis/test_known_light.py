@@ -13,7 +13,7 @@ from camera.stimulus import bench, scene, write_table
 
 from adv2e.diagnosis import prepare
 from adv2e.diagnosis.fitting.library import names
-from adv2e.diagnosis.outcome import conclusion
+from adv2e.diagnosis.outcome import verdict
 from adv2e.diagnosis.selection import reference, shortlist
 
 SIZE, SECONDS = (12, 10), 0.5
@@ -26,7 +26,7 @@ def _short(monkeypatch):
     for module in (reference, shortlist):
         monkeypatch.setattr(module, "SOME", 16)
     monkeypatch.setattr(prepare, "PILOT_SEEDS", range(10_000, 10_004))
-    monkeypatch.setattr(conclusion, "DRAWS", 4)
+    monkeypatch.setattr(verdict, "DRAWS", 4)
 
 
 @pytest.fixture

@@ -67,7 +67,7 @@ def noise(seed: int):
 
 
 class MadeUpSampler:
-    """Stands in for :class:`adv2e.diagnosis.statistics.sampler.Sampler`.
+    """Stands in for :class:`adv2e.diagnosis.statistics.summary.Sampler`.
 
     Parameters
     ----------

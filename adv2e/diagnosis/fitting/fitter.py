@@ -30,10 +30,9 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.fitting.candidates import Candidate
-from adv2e.diagnosis.fitting.fitted import Fitted
-from adv2e.diagnosis.fitting.slope import Axes, Slope, gentler
+from adv2e.diagnosis.fitting.fitted import Axes, Fitted, Slope, gentler
 from adv2e.diagnosis.statistics.metric import Scale
-from adv2e.diagnosis.statistics.sampler import Sampler
+from adv2e.diagnosis.statistics.summary import Sampler
 
 Array = NDArray[np.float64]
 

@@ -16,8 +16,7 @@ from adv2e.diagnosis.fitting.fitted import Fitted, parted
 from adv2e.diagnosis.fitting.fitter import Fitter
 from adv2e.diagnosis.statistics.groups import least_deviations
 from adv2e.diagnosis.statistics.metric import Ensemble, Scale
-from adv2e.diagnosis.statistics.sampler import Sampler
-from adv2e.diagnosis.statistics.summary import BOTH, VIEWS
+from adv2e.diagnosis.statistics.summary import BOTH, VIEWS, Sampler
 from adv2e.diagnosis.statistics.uncertainty import FrameError, Resampling
 from adv2e.reports.result import Rejected
 

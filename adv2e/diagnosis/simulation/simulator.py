@@ -1,4 +1,4 @@
-"""Simulations of the recording's own frames with a configuration, many at a time."""
+"""Simulations of the recording's own frames, many at a time, and the progress of a diagnosis."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import dataclasses
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,9 +16,29 @@ from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.simulation.affordable import FINE
 from adv2e.diagnosis.simulation.frames import FrameCache, Instants, events_of
-from adv2e.diagnosis.simulation.progress import Progress
 from adv2e.effects.frames.misregistration import shifted
 from adv2e.pixel.steps import Coarseness
+
+# ---- Progress of a diagnosis.
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Progress of a diagnosis: its stage, and the simulations done.
+
+    The total number of simulations is not known before: it depends on their results.
+
+    Attributes
+    ----------
+    stage : str
+        In a few words.
+    simulations : int
+        Done since the diagnosis began, in all stages.
+    """
+
+    stage: str
+    simulations: int
+
 
 Result = TypeVar("Result")
 

@@ -57,8 +57,7 @@ from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.simulation.simulator import Simulator
 from adv2e.diagnosis.statistics.metric import compressed, expanded
-from adv2e.diagnosis.statistics.sampler import Sampler
-from adv2e.diagnosis.statistics.summary import SummaryStatistics
+from adv2e.diagnosis.statistics.summary import Sampler, SummaryStatistics
 
 Array = NDArray[np.float64]
 

@@ -15,9 +15,8 @@ from made_up.sampler import (
 from adv2e.config import Config, load_config
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
-from adv2e.diagnosis.fitting.fitted import Fitted
+from adv2e.diagnosis.fitting.fitted import Fitted, Slope
 from adv2e.diagnosis.fitting.fitter import Fitter
-from adv2e.diagnosis.fitting.slope import Slope
 
 VIEW = splits.TRAIN
 

@@ -13,10 +13,8 @@ from adv2e.diagnosis.configurations import with_keys
 from adv2e.diagnosis.data.evidence import Evidence, RunIn
 from adv2e.diagnosis.data.scene import Scene
 from adv2e.diagnosis.hints.lamps import lamps_of
-from adv2e.diagnosis.simulation.progress import Progress
-from adv2e.diagnosis.simulation.simulator import Simulator
-from adv2e.diagnosis.statistics.sampler import Sampler
-from adv2e.diagnosis.statistics.summary import SummaryStatistics
+from adv2e.diagnosis.simulation.simulator import Progress, Simulator
+from adv2e.diagnosis.statistics.summary import Sampler, SummaryStatistics
 from adv2e.effects.frames.misregistration import shifted
 from adv2e.light.interpolation import make_upsampler
 from adv2e.pixel.steps import steps_of

@@ -6,8 +6,7 @@ from made_up.cameras import Apart, Recorded
 
 from adv2e.diagnosis.configurations import with_keys
 from adv2e.diagnosis.simulation.simulator import Simulator
-from adv2e.diagnosis.statistics.sampler import Sampler
-from adv2e.diagnosis.statistics.summary import BOTH, SummaryStatistics
+from adv2e.diagnosis.statistics.summary import BOTH, Sampler, SummaryStatistics
 from adv2e.diagnosis.statistics.uncertainty import Resampling
 
 SHIFT = [0.4, 0.25]
