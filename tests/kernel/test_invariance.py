@@ -11,9 +11,7 @@ from harness import EVERYTHING, IN_LANES, advance, quiet, start
 
 from adv2e.config.model import LowPass, Pixel, ResetOvershoot, SlewLimit, Thresholds
 from adv2e.effects.courses import INJECTED_DTYPE, Additions
-from adv2e.events import pixels_of
 from adv2e.pixel import steps as stepping
-from adv2e.pixel.array import pixels_of_share
 
 FRAMES, ROWS, COLUMNS = 19, 48, 70
 ALL = {
@@ -102,35 +100,6 @@ def test_tiles_chunks_and_threads_change_nothing(name, printed, monkeypatch):
     # as few steps in memory at a time as can be
     monkeypatch.setattr(stepping, "_VALUES", 1)
     assert whole.tobytes() == run(pixel, light, **same).tobytes()
-
-
-@pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("causes", [False, True])
-@pytest.mark.quick_cases(1)
-def test_a_share_has_the_events_of_the_whole_at_its_pixels(name, causes):
-    sections = dict(CASES[name])
-    light, same = clip(), {"causes": causes, "additions": sections.pop("additions", None)}
-    pixel = Pixel(**sections)
-    whole = run(pixel, light, **same)
-    at = pixels_of(whole, COLUMNS)
-    for count, options in ((2, {"threads": 2}), (3, {"chunk": 5})):
-        ends = [0]
-        for number in range(1, count + 1):
-            begin, end = pixels_of_share(ROWS * COLUMNS, (number, count))
-            assert begin == ends[-1]
-            ends.append(end)
-            part = run(pixel, light, **same, share=(number, count), **options)
-            wanted = whole[(at >= begin) & (at < end)]
-            order = ("t", "y", "x", "p")
-            assert np.sort(part, order=order).tobytes() == np.sort(wanted, order=order).tobytes()
-            assert (part.size > 100) == (begin < end)
-        assert ends[-1] == ROWS * COLUMNS
-
-
-def test_shares_are_about_as_large():
-    sizes = [np.diff(pixels_of_share(1280 * 720, (k, 7)))[0] for k in range(1, 8)]
-    assert sum(sizes) == 1280 * 720
-    assert max(sizes) - min(sizes) <= 2048
 
 
 @pytest.mark.parametrize("sections", [{}, IN_LANES, CASCADE, EVERYTHING])
