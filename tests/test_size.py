@@ -44,7 +44,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 382
+FILES = 383
 """Most modules of all packages together."""
 
 _SLACK = 60

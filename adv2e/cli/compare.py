@@ -125,7 +125,7 @@ def _resimulation(
     from dataclasses import replace
 
     from adv2e.comparison.compare import Resimulation
-    from adv2e.comparison.floor import resimulator
+    from adv2e.comparison.resimulation import resimulator
     from adv2e.errors import DataError
     from adv2e.kernel.rng import LARGEST_SEED
     from adv2e.light.sensor import check_beside

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
-from html import escape
 from itertools import compress
 from pathlib import Path
 from typing import Any
@@ -14,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.events import Events
+from adv2e.events import Events, cut
 from adv2e.files.names import shown
 from adv2e.sources.frame import Frame, Image, Light, Pixels, as_pixels, odd_white
 from adv2e.sources.stored import recorded_light
@@ -77,23 +75,20 @@ class Recording:
         return True  # also without events
 
     @property
-    def start_us(self) -> int:
-        """Time of the first event or frame [us]; 0 without any."""
-        return self._span_us()[0]
-
-    @property
-    def duration_s(self) -> float:
-        """Time from the first event or frame to the last one [s]; 0 without any."""
-        first, last = self._span_us()
-        return (last - first) * 1e-6
-
-    def _span_us(self) -> tuple[int, int]:
+    def span_us(self) -> tuple[int, int]:
+        """Times of the first and the last event or frame [us]; (0, 0) without any."""
         times = [self.events["t"][[0, -1]]] if self.events.size else []
         if self.frame_times_ns is not None and self.frame_times_ns.size:
             times.append(microseconds(self.frame_times_ns[[0, -1]]))
         if not times:
             return 0, 0
         return min(int(pair[0]) for pair in times), max(int(pair[1]) for pair in times)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first event or frame to the last one [s]; 0 without any."""
+        first, last = self.span_us
+        return (last - first) * 1e-6
 
     def __getitem__(self, part: slice) -> Recording:
         """Return the part from `start` to before `stop` [s after the first event or frame].
@@ -105,25 +100,17 @@ class Recording:
         """
         if not isinstance(part, slice) or part.step is not None:
             raise TypeError("a recording takes a slice of seconds, such as recording[0.5:1.0]")
-        begin_us = self.start_us
-        low, high = (
-            None if time is None else begin_us + round(time * 1e6)
-            for time in (part.start, part.stop)
-        )
-        times = self.events["t"]
-        first = 0 if low is None else int(np.searchsorted(times, low))
-        last = len(self) if high is None else int(np.searchsorted(times, high))
-        kept = None
-        images = self.images
-        if self.frame_times_ns is not None:
-            at_us = microseconds(self.frame_times_ns)
-            inside = np.ones(len(at_us), bool) if low is None else at_us >= low
-            inside &= True if high is None else at_us < high
-            kept = self.frame_times_ns[inside]
-            images = partial(_chosen, self.images, inside.tolist())
-        return replace(
-            self, events=self.events[first : max(first, last)], frame_times_ns=kept, images=images
-        )
+        first, last = self.span_us
+        start = first if part.start is None else first + round(part.start * 1e6)
+        stop = last + 1 if part.stop is None else first + round(part.stop * 1e6)
+        events = cut(self.events, start, stop)
+        if self.frame_times_ns is None:
+            return replace(self, events=events)
+        at_us = microseconds(self.frame_times_ns)
+        inside = (start <= at_us) & (at_us < stop)
+        images = partial(_chosen, self.images, inside.tolist())
+        times_ns = self.frame_times_ns[inside]
+        return replace(self, events=events, frame_times_ns=times_ns, images=images)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the events to a file; see :func:`adv2e.write_events`."""
@@ -141,17 +128,20 @@ class Recording:
 
     def _repr_html_(self) -> str:
         """Return the same for notebooks, with a picture of its events."""
-        import cv2  # noqa: PLC0415 - for notebooks alone
+        from base64 import b64encode  # noqa: PLC0415 - all these are for notebooks alone
+        from html import escape  # noqa: PLC0415
+        from tempfile import TemporaryDirectory  # noqa: PLC0415
 
         from adv2e import render  # noqa: PLC0415 - which is above this module
 
         text = f"<p>{escape(repr(self))}</p>"
         if not (self.events.size and self.width and self.height):
             return text
-        picture = render(self, count=1, frames=False)
-        assert picture is not None
-        data = cv2.imencode(".png", picture[:, :, ::-1])[1].tobytes()
-        return f'{text}<img src="data:image/png;base64,{b64encode(data).decode()}"/>'
+        with TemporaryDirectory(prefix="adv2e-render-") as folder:
+            picture = Path(folder) / "events.png"
+            render(self, picture, count=1, frames=False)
+            data = b64encode(picture.read_bytes()).decode()
+        return f'{text}<img src="data:image/png;base64,{data}"/>'
 
     @property
     def light(self) -> Light:

@@ -73,8 +73,8 @@ def render_recording(
     has_frames = recording.frame_times_ns is not None and recording.frame_times_ns.size > 0
     if not (len(recording) or has_frames):
         raise DataError(f"{recording.path}: holds no events and no frames")
-    begin_us = recording.start_us
-    until_us = begin_us + round(recording.duration_s * 1e6) + 1
+    begin_us, last_us = recording.span_us
+    until_us = last_us + 1
     lasts = f"{recording.path}: lasts {(until_us - begin_us) * 1e-6:.3f} s"
     frames = frames and has_frames
     if not (recording.width and recording.height):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -109,56 +110,41 @@ def render(
     >>> render(events, size=(32, 24), count=1, scale=1).dtype
     dtype('uint8')
     """
-    if output is None:
-        with tempfile.TemporaryDirectory(prefix="adv2e-render-") as folder:
-            sheet = Path(folder) / "events.png"
-            render(
-                events,
-                sheet,
-                size=size,
-                style=style,
-                on_color=on_color,
-                off_color=off_color,
-                window_ms=window_ms,
-                fps=fps,
-                speed=speed,
-                start_s=start_s,
-                stop_s=stop_s,
-                at_s=at_s,
-                count=count,
-                frames=frames,
-                scale=scale,
-                progress=progress,
-            )
-            picture: Any = cv2.imread(str(sheet))
-            return np.ascontiguousarray(picture[:, :, ::-1], np.uint8)
-    chosen = chosen_style(
-        output,
-        style,
-        on_color,
-        off_color,
-        window_ms=window_ms,
-        fps=fps,
-        speed=speed,
-        at_s=at_s,
-    )
-    render_recording(
-        _recording(events, size),
-        output,
-        style=chosen,
-        fps=fps,
-        speed=speed,
-        at_s=at_s,
-        count=count,
-        start_s=start_s,
-        stop_s=stop_s,
-        frames=frames,
-        scale=scale,
-        overwrite=overwrite,
-        progress=progress,
-        max_pictures=max_pictures,
-    )
-    return None
+    with ExitStack() as stack:
+        path = output
+        if path is None:
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="adv2e-render-"))
+            path = Path(folder) / "events.png"
+        chosen = chosen_style(
+            path,
+            style,
+            on_color,
+            off_color,
+            window_ms=window_ms,
+            fps=fps,
+            speed=speed,
+            at_s=at_s,
+        )
+        render_recording(
+            _recording(events, size),
+            path,
+            style=chosen,
+            fps=fps,
+            speed=speed,
+            at_s=at_s,
+            count=count,
+            start_s=start_s,
+            stop_s=stop_s,
+            frames=frames,
+            scale=scale,
+            overwrite=overwrite,
+            progress=progress,
+            max_pictures=max_pictures,
+        )
+        if output is not None:
+            return None
+        picture: Any = cv2.imread(str(path))
+        return np.ascontiguousarray(picture[:, :, ::-1], np.uint8)
 
 
 def chosen_style(

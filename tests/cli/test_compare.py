@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from adv2e.comparison import floor
+from adv2e.comparison import resimulation
 from adv2e.events import make_events, sort_events
 from adv2e.formats.writing import open_sink
 
@@ -50,7 +50,7 @@ def simulation(monkeypatch):
         calls.append(([float(image[0, 0]) for _, image in light], config, threads))
         yield some_events(config.seed + 100)
 
-    monkeypatch.setattr(floor, "events_from_light", events_from_light)
+    monkeypatch.setattr(resimulation, "events_from_light", events_from_light)
     return calls
 
 
