@@ -28,6 +28,10 @@ def machine_complaint(error: BaseException) -> str:
         isinstance(error, OSError) and error.errno in (errno.ENOMEM, errno.EAGAIN)
     )
     found = _SIGNS.search(told)
+    if isinstance(error, ModuleNotFoundError) and (error.name or "").partition(".")[0] == "adv2e":
+        # Python takes a file whose state it could not read for one that is not there
+        missing = f"to load {error.name}, or adv2e is not installed whole"
+        return f"not enough memory (see ulimit -v) {missing}"
     if not of_limits and not (
         found and isinstance(error, (ImportError, OSError, RuntimeError, SystemError))
     ):

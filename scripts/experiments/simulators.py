@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks.worker import TOOLS
 from writing import one_line_errors, table, threads_option
 
-from adv2e.comparison.floor import resimulator
+from adv2e.comparison.resimulation import resimulator
 from adv2e.config import Config, load_config
 from adv2e.effects.frames.encoding import encode_light
 from adv2e.effects.pixel.thresholds import FLOOR

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from adv2e.comparison.floor import resimulator
+from adv2e.comparison.resimulation import resimulator
 from adv2e.config import load_config
 from adv2e.diagnosis.data.evidence import read_evidence
 from adv2e.formats.reading import read_events

@@ -31,6 +31,8 @@ MEMORY, THREADS = "not enough memory (see ulimit -v)", "the machine starts no mo
         (ValueError("failed to allocate"), ""),
         (OSError(errno.ENOENT, "No such file or directory"), ""),
         (ImportError("No module named 'tqdm'"), ""),
+        (ModuleNotFoundError("No module named 'adv2e.pixel'", name="adv2e.pixel"), MEMORY),
+        (ModuleNotFoundError("No module named 'tqdm'", name="tqdm"), ""),
     ],
 )
 def test_what_is_told(error, begin):
