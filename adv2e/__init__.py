@@ -8,6 +8,8 @@ read_events   a file of events -> Recording (events, sensor size, frames if ther
 write_events  events -> a file
 voxel_grid    events -> (bins, rows, columns), as networks take them
 render        events -> pictures and films
+export        events -> training sets and voxel grids in a folder
+batch         every sequence below a folder -> the same tree of events
 compare       two recordings -> how far one is from the other
 info          any input -> what it holds
 diagnose      a real recording -> the effect that its simulation lacks
@@ -49,9 +51,11 @@ __all__ = [
     "Recording",
     "UsageError",
     "__version__",
+    "batch",
     "compare",
     "convert",
     "diagnose",
+    "export",
     "info",
     "load_config",
     "read_events",
@@ -63,6 +67,7 @@ __all__ = [
 
 TYPE_CHECKING = False  # as in `typing`, which takes longer to import than all else here
 if TYPE_CHECKING:
+    from adv2e.batches.run import batch
     from adv2e.comparison.compare import compare
     from adv2e.config import Config, load_config
     from adv2e.conversion.convert import convert
@@ -78,6 +83,7 @@ if TYPE_CHECKING:
         UsageError,
     )
     from adv2e.events import EVENT_DTYPE
+    from adv2e.exporting.export import export
     from adv2e.formats.reading import read_events
     from adv2e.formats.recording import Recording
     from adv2e.formats.writing import write_events
@@ -96,9 +102,11 @@ _HOMES = {
     "OutputError": "adv2e.errors",
     "Recording": "adv2e.formats.recording",
     "UsageError": "adv2e.errors",
+    "batch": "adv2e.batches.run",
     "compare": "adv2e.comparison.compare",
     "convert": "adv2e.conversion.convert",
     "diagnose": "adv2e.diagnosis.recordings",
+    "export": "adv2e.exporting.export",
     "info": "adv2e.inspection.inspect",
     "load_config": "adv2e.config",
     "read_events": "adv2e.formats.reading",

@@ -56,7 +56,7 @@ def sources() -> list[Path]:
         for path in sorted(_PACKAGE.rglob("*.py"))
         if path.stem == "compiled"
         or not whole.isdisjoint((path, *path.parents))
-        or b"adv2e.compiled" in path.read_bytes()
+        or (path.parent.name != "cli" and b"adv2e.compiled" in path.read_bytes())
     ]
 
 

@@ -22,6 +22,7 @@ Programming errors (wrong types from our own code) stay ordinary Python exceptio
 from __future__ import annotations
 
 import sys
+import warnings
 from pathlib import Path
 
 
@@ -59,6 +60,16 @@ class UsageError(Adv2eError):
     """The command line alone is wrong."""
 
     exit_status = 2
+
+
+def warn(text: str) -> None:
+    """Warn of a doubt, in the name of the line outside adv2e that led to it."""
+    import inspect  # noqa: PLC0415 - warnings are few
+
+    frame, level = inspect.currentframe(), 0
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "adv2e":
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, Adv2eWarning, stacklevel=level + 1)
 
 
 class MissingExtraError(Adv2eError):

@@ -22,7 +22,10 @@ _OTHER_NAMES = {
 }
 _FLAGS = ("overwrite", "allow_damaged", "rotate180", "with_frames", "causes", "crop_events")
 # a command that is quoted stays as it is typed in a shell
-_OPTION = re.compile(r"'adv2e [^']*'|(?<![\w-])--([a-z][a-z0-9-]*)(?: ([A-Z]+\b|zero\b|\d+\b))?")
+_OPTION = re.compile(
+    r"'adv2e [^']*'|(?<![\w-])--([a-z][a-z0-9-]*)(?: ([A-Z]+\b|zero\b|frames\b|events\b|\d+\b))?"
+    r"|(?<![\w-])-o OUT\b"
+)
 
 
 def in_python(text: str) -> str:
@@ -30,7 +33,7 @@ def in_python(text: str) -> str:
 
     def argument(found: re.Match[str]) -> str:
         if found[1] is None:
-            return found[0]
+            return "output" if found[0] == "-o OUT" else found[0]
         name = found[1].replace("-", "_")
         name = _OTHER_NAMES.get(name, name)
         value = "True" if name in _FLAGS else found[2]

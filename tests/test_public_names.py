@@ -69,7 +69,7 @@ WRONG = {
     " timestamps=FILE",
     "adv2e.convert('c.npy', 'd.h5', fps=9, time_unit='s')": "time_unit is for lists of times, which"
     " fps replaces",
-    "adv2e.convert('c.npy', 'd.h5', fps=9, start_s=2, stop_s=1)": "stop_s: must be after start_s",
+    "adv2e.convert('c.npy', 'd.h5', fps=9, start_s=2, stop_s=1)": "stop_s=1 must be after start_s",
     "adv2e.convert('c.npy', 'd.bag', fps=9, layout='x')": "layout x: only HDF5",
     "adv2e.render('e.txt', 'e.mp4', at_s=[1])": "instants (at_s) are for a .png",
     "adv2e.read_events('none.h5')": "none.h5: no such file",

@@ -18,33 +18,33 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 690,
-    "batch": 1260,
-    "cli": 2030,
+    "": 1370,
+    "batches": 1400,
+    "cli": 1390,
     "comparison": 650,
     "compilation": 210,
     "config": 1340,
-    "conversion": 1350,
-    "diagnosis": 7020,
+    "conversion": 1270,
+    "diagnosis": 6970,
     "effects": 1630,
-    "export": 430,
+    "exporting": 470,
     "files": 790,
-    "formats": 5450,
-    "inspection": 290,
+    "formats": 5430,
+    "inspection": 270,
     "kernel": 4870,
     "light": 870,
     "motion": 360,
     "pixel": 580,
     "process": 240,
-    "rendering": 820,
+    "rendering": 760,
     "reports": 1790,
     "representations": 120,
-    "sources": 3690,
+    "sources": 3670,
     "synthetic": 170,
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 383
+FILES = 384
 """Most modules of all packages together."""
 
 _SLACK = 60

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from pictures import picture
 
-from adv2e.batch.work import do
+from adv2e.batches.work import do
 
 QUICK = ("--set", "sampling.L=1", "--set", "pixel.low_pass=null")
 
@@ -59,7 +59,7 @@ def command(*args):
 
 
 def in_this_process(jobs, count):
-    """Do what :func:`adv2e.batch.processes.run` does, without the time that processes need."""
+    """Do what :func:`adv2e.batches.processes.run` does, without the time that processes need."""
     return ((job, do(job)) for job in jobs)
 
 

@@ -14,7 +14,7 @@ from adv2e.errors import UsageError
 _GROUPS = {
     "Input": (
         *("fps", "timestamps", "time_unit", "track", "start", "stop", "start_s", "stop_s", "crop"),
-        *("rotate180", "bayer", "pixel_format", "allow_damaged", "choice"),
+        *("rotate180", "bayer", "pixel_format", "allow_damaged", "take"),
         *("set_back", "crop_events"),
         *("frames_path", "layout_of_source", "light"),
     ),
@@ -26,7 +26,7 @@ _GROUPS = {
         *("output", "overwrite", "format", "layout", "t0", "with_frames", "preview", "causes"),
         "as_json",
     ),
-    "Running": ("threads", "jobs", "shard", "scheduler", "split", "dry_run", "progress", "quiet"),
+    "Running": ("threads", "jobs", "shard", "scheduler", "dry_run", "progress", "quiet"),
 }
 """Options by what they are about, where a command has many; the others stand before or after."""
 

@@ -9,6 +9,7 @@ import click
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
 from adv2e.cli.progress import reading_told
+from adv2e.options import EventInput
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,10 +43,13 @@ if TYPE_CHECKING:
     help="Take the frames from INPUT, on the clock of MEASURED. They set the windows, and are what"
     " is simulated.  [default: the frames in MEASURED]",
 )
-@options.time_unit_option
-@options.rotate_option(" of MEASURED, and of --frames,")
-@options.track_option("MEASURED")
-@options.events_options
+@options.declared_options(
+    EventInput,
+    help={
+        "rotate180": "Of MEASURED, and of --frames.",
+        "track": "Of MEASURED.",
+    },
+)
 @options.config_options
 @options.threads_option
 @options.reporting_options
@@ -55,10 +59,7 @@ def command(
     as_json: bool,
     window_s: float | None,
     frames_path: str | None,
-    time_unit: str | None,
-    rotate180: bool,
-    track: str | None,
-    reading: dict[str, Any],
+    given: dict[str, Any],
     config: Callable[[], Config],
     threads: int | None,
     progress: bool,
@@ -86,13 +87,13 @@ def command(
     from adv2e.formats.reading import read_events
 
     declared = config()
-    reading["time_unit"] = time_unit
     with reading_told(measured, progress) as told:
-        given = {**reading, "rotate180": rotate180, "track": track}
         ours = read_events(measured, progress=told, **given)
     with reading_told(simulated, progress) as told:
-        theirs = read_events(simulated, progress=told, **reading)
-    source = open_frames(frames_path, rotate180=rotate180) if frames_path else None
+        theirs = read_events(
+            simulated, progress=told, **{**given, "rotate180": False, "track": None}
+        )
+    source = open_frames(frames_path, rotate180=given["rotate180"]) if frames_path else None
     for doubt in source.doubts if source else []:
         log(doubt)
     times = np.array([frame.t_ns for frame in source.frames()]) if source else None

@@ -8,72 +8,28 @@ import click
 
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
+from adv2e.options import DiagnoseOptions
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from adv2e.cli.options import Log
     from adv2e.config import Config
-    from adv2e.geometry import Rectangle, Size
+    from adv2e.geometry import Size
 
 
 @click.command("diagnose", cls=Command)
 @click.argument("recording", metavar="RECORDING", shell_complete=completion.files)
 @options.config_options
-@options.run_options
-@click.option(
-    "--without",
-    "without",
-    multiple=True,
-    metavar="EFFECT",
-    shell_complete=completion.library,
-    help="Leave an effect out of the library. Repeatable.",
-)
-@click.option(
-    "--fit-thresholds",
-    is_flag=True,
-    help="The contrast thresholds are not known: fit them first, to the totals of ON and OFF.",
-)
-@click.option(
-    "--light",
-    metavar="TABLE",
-    shell_complete=completion.files,
-    help="What the light was, in the place of frames: columns time_s and light_dn (255 is white).",
-)
-@click.option(
-    "--size",
-    type=options.SIZE,
-    metavar="WxH",
-    help="Size of the sensor (sensor.width and sensor.height), where the file does not tell it.",
-)
-@options.time_unit_option
-@options.rotate_option()
-@options.track_option("RECORDING")
-@click.option(
-    "--start", type=options.SECONDS, metavar="S", help="Look at it from S seconds after its start."
-)
-@click.option(
-    "--stop", type=options.SECONDS, metavar="S", help="Look at it until S seconds after its start."
-)
-@options.crop_option("Look at a part of the sensor only: first column, first row, columns, rows.")
-@options.events_options
+@options.output_options
+@options.reporting_options
+@options.declared_options(DiagnoseOptions)
 def command(
     recording: str,
     config: Callable[[Size | None], Config],
     output: str | None,
     overwrite: bool,
-    without: tuple[str, ...],
-    fit_thresholds: bool,
-    light: str | None,
-    size: Size | None,
-    time_unit: str | None,
-    rotate180: bool,
-    track: str | None,
-    start: float | None,
-    stop: float | None,
-    crop: Rectangle | None,
-    reading: dict[str, Any],
-    threads: int | None,
+    given: dict[str, Any],
     progress: bool,
     log: Log,
 ) -> None:
@@ -108,28 +64,22 @@ def command(
     from adv2e.files.names import shown
     from adv2e.reports.summary import summary_text
 
-    options.check_part(start, stop)
-    declared = config(size)
-    options_given = click.get_current_context().params
-    given = options_given["config_files"], options_given["sets"]
+    declared = config(given["size"])
+    params = click.get_current_context().params
+    layers = params["config_files"], params["sets"]
     folder = Path(output or f"{Path(recording).stem}.diagnosis")
     found = diagnose_file(
         recording,
         declared,
-        name=names_of(*given),
-        written=written_keys(*given),
+        name=names_of(*layers),
+        written=written_keys(*layers),
         also_read=options.files_given(),
-        light=light,
         output=folder,
-        without=without,
-        fit_thresholds=fit_thresholds,
-        reading={**reading, "time_unit": time_unit, "rotate180": rotate180, "track": track},
-        part=(start, stop, crop),
         overwrite=overwrite,
-        threads=threads,
         progress=progress,
         say=log,
         log=lambda text: log(text, 1),
+        **given,
     )
     for line in summary_text(found).splitlines():
         log(line)

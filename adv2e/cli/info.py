@@ -10,28 +10,18 @@ import click
 from adv2e.cli import options
 from adv2e.cli.commands import Command
 from adv2e.cli.progress import reading_told
-from adv2e.geometry import Size
+from adv2e.options import InfoOptions
 
 
 @click.command("info", cls=Command)
 @click.argument("file", metavar="FILE", type=click.Path(path_type=Path, readable=False))
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, always with the same keys.")
-@options.source_options
-@click.option(
-    "--set-back",
-    type=click.Choice(options.SET_BACK),
-    help="Where times of events go back by more than 0.1 s: see 'adv2e convert'.",
-)
-@click.option(
-    "--size", type=options.SIZE, metavar="WxH", help="Size of the frames of raw video (FILE is -)."
-)
+@options.declared_options(InfoOptions)
 @options.reporting_options
 def command(
     file: Path,
     as_json: bool,
     given: dict[str, Any],
-    set_back: str | None,
-    size: Size | None,
     progress: bool,
     log: options.Log,
 ) -> None:
@@ -49,11 +39,9 @@ def command(
     """
     from adv2e.inspection.inspect import info
 
-    if size is not None and given["pixel_format"] is None:
-        raise click.UsageError("--size is that of raw video, of which --pixel-format says the rest")
     log(f"reading {file}", 1)
     with reading_told(file, progress) as told:
-        report = info(file, **given, set_back=set_back, frame_size=size, progress=told)
+        report = info(file, progress=told, **given)
     if as_json:
         import json
 

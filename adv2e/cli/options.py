@@ -10,7 +10,7 @@ import functools
 import math
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +23,7 @@ from adv2e.cli.exit_status import VERBOSITY
 from adv2e.cli.progress import compilation_told
 from adv2e.files.names import shown
 from adv2e.geometry import parse_rectangle, parse_size
+from adv2e.options import BAYER, Option, Run, declared
 
 if TYPE_CHECKING:
     from adv2e.config import Config
@@ -98,19 +99,8 @@ def _microseconds(text: str) -> int:
 
 
 TIME = Parsed("time", _microseconds)
-# adv2e.sources.wanted.PATTERNS, without the time that importing it takes
-BAYER = ("RGGB", "BGGR", "GRBG", "GBRG")
-# adv2e.sources.pipes.raw.PIXEL_FORMATS, likewise
-PIXEL_FORMATS = (
-    *("gray", "gray10le", "gray12le", "gray14le", "gray16le", "rgb24", "bgr24", "rgb48le"),
-)
 SIZE = Parsed("size", parse_size)
 RECTANGLE = Parsed("rectangle", parse_rectangle)
-
-
-def crop_option(text: str) -> Callable[[Body], Body]:
-    """Return a decorator that adds --crop, with the help `text`; passes ``crop``, or None."""
-    return click.option("--crop", type=RECTANGLE, metavar="X,Y,W,H", help=text)
 
 
 def rate(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
@@ -249,129 +239,68 @@ def config_options(body: Body) -> Body:
 SECONDS = FiniteNumber(min=0)
 POSITIVE = FiniteNumber(min=0, min_open=True)
 
+_TYPES: dict[str, Any] = {
+    "path": click.Path(path_type=Path),
+    "size": SIZE,
+    "rectangle": RECTANGLE,
+    "seconds": SECONDS,
+    "positive": POSITIVE,
+    "share": FiniteNumber(0, 0.9),
+    "time": TIME,
+}
+"""Types of Click by kind of option; the others are text."""
 
-def check_part(start: float | None, stop: float | None) -> None:
-    """Raise UsageError if --stop is not after --start."""
-    if start is not None and stop is not None and stop <= start:
-        raise click.UsageError(f"--stop {stop:g} must be after --start {start:g}")
 
+def declared_options(
+    *groups: Any, without: Collection[str] = (), help: Mapping[str, str] | None = None
+) -> Callable[[Body], Body]:
+    """Return a decorator that adds the options of groups (:mod:`adv2e.options`).
 
-def source_options(body: Body) -> Body:
-    """Add what says how to read an input with frames.
-
-    The command gets ``given``, these by the names that :func:`adv2e.sources.open_source` has for
-    them: fps, as it was written, timestamps, time_unit, allow_damaged, bayer, pixel_format,
-    rotate180 and track.
+    The command gets them as ``given``, a dict by their names in Python.  Those of
+    :func:`reporting_options` and :func:`output_options` are left out, and those `without`; `help`
+    says more of some.
     """
+    apart = {"progress", "overwrite", *without}
+    wanted = {name: one for name, one in declared(*groups).items() if name not in apart}
 
-    @click.option(
-        "--fps",
-        metavar="F",
-        callback=rate,
-        help="Take the frames at F a second, such as 240 or 30000/1001, whatever the input says.",
-    )
-    @click.option(
-        "--timestamps",
-        type=click.Path(path_type=Path),
-        metavar="FILE",
-        help="Read the times of the frames from FILE, one a line.",
-    )
-    @time_unit_option
-    @click.option(
-        "--allow-damaged",
-        is_flag=True,
-        help="Take what can be decoded of a damaged video, and say what is missing.",
-    )
-    @click.option(
-        "--bayer",
-        type=click.Choice(BAYER, case_sensitive=False),
-        help="Frames are raw mosaics, with these colours in the first two rows: make them colour.",
-    )
-    @click.option(
-        "--pixel-format",
-        type=click.Choice(PIXEL_FORMATS),
-        help="Raw video comes through standard input (INPUT is -), in frames of the --size given.",
-    )
-    @rotate_option()
-    @track_option()
-    @functools.wraps(body)
-    def with_given(*args: Any, **kw: Any) -> Any:
-        names = (
-            "fps",
-            "timestamps",
-            "time_unit",
-            "allow_damaged",
-            "bayer",
-            "pixel_format",
-            "rotate180",
-            "track",
-        )
-        return body(*args, given={name: kw.pop(name) for name in names}, **kw)
+    def decorate(body: Body) -> Body:
+        @functools.wraps(body)
+        def with_given(*args: Any, **kw: Any) -> Any:
+            return body(*args, given={name: kw.pop(name) for name in wanted}, **kw)
 
-    return with_given  # type: ignore[return-value]
+        made: Any = with_given
+        for name, option in reversed(wanted.items()):
+            made = _click_option(name, option, (help or {}).get(name, ""))(made)
+        return made  # type: ignore[no-any-return]
+
+    return decorate
 
 
-# adv2e.formats.clock.SET_BACK, without the time that importing it takes
-SET_BACK = ("continue", "sort")
-
-
-def events_options(body: Body) -> Body:
-    """Add what says which events are taken; the command gets ``reading``, a dict.
-
-    It holds these by the names that :func:`adv2e.read_events` has for them.
-    """
-
-    @click.option(
-        "--set-back",
-        type=click.Choice(SET_BACK),
-        help="Where times of events go back by more than 0.1 s. continue: from the time before, as"
-        " where a clock was reset. sort: by time.  [default: an error]",
-    )
-    @click.option(
-        "--crop-events",
-        is_flag=True,
-        help="Leave out events outside the sensor, however many.  [default: more than 1 % are an"
-        " error]",
-    )
-    @functools.wraps(body)
-    def with_reading(*args: Any, set_back: str | None, crop_events: bool, **kw: Any) -> Any:
-        return body(*args, reading={"set_back": set_back, "crop_events": crop_events}, **kw)
-
-    return with_reading  # type: ignore[return-value]
-
-
-def rotate_option(what: str = "") -> Callable[[Body], Body]:
-    """Return a decorator that adds --rotate180 (turns `what`); passes ``rotate180``, a bool."""
-    return click.option(
-        "--rotate180",
-        is_flag=True,
-        help=f"Turn frames and events{what} by 180 degrees, first of all: the camera was mounted"
-        " upside down, as for DDD17 and DDD20.",
-    )
-
-
-def track_option(what: str = "INPUT") -> Callable[[Body], Body]:
-    """Return a decorator that adds --track (one of the tracks in `what`); passes ``track``."""
-    return click.option(
-        "--track",
-        "--stream",
-        "--topic",
-        "track",
-        metavar="N|NAME",
-        callback=_not_empty,
-        help=f"Which one to read of several video tracks, streams or topics in {what}: its number"
-        " from 0, or its name.  [default: the usual one of them, and a line that tells all]",
-    )
-
-
-def time_unit_option(body: Body) -> Body:
-    """Add --time-unit; the command gets ``time_unit``, a name or None."""
-    return click.option(
-        "--time-unit",
-        type=click.Choice(["s", "ms", "us", "ns"]),
-        help="Unit of the times in lists and event files.  [default: what the file says; else a"
-        " guess, and a line that tells it]",
-    )(body)
+def _click_option(name: str, option: Option, help: str = "") -> Callable[[Body], Body]:
+    """Return the decorator of Click that adds one option that is declared."""
+    about: dict[str, Any] = {"default": option.default, "metavar": option.metavar or None}
+    text = f"{option.help} {help}".rstrip()
+    if option.default == ():
+        about["multiple"], text = True, f"{text} Repeatable."
+    elif option.default not in (None, False):
+        about["show_default"] = True
+    if option.default is False:
+        about = {"is_flag": True}
+    elif option.choices:
+        about["type"] = click.Choice(option.choices, case_sensitive=option.choices != BAYER)
+    elif option.kind == "count":
+        about["type"] = WholeNumber(1, option.most)
+    elif option.kind in _TYPES:
+        about["type"] = _TYPES[option.kind]
+    elif option.kind == "rate":
+        about["callback"] = rate
+    elif option.default is None:
+        about["callback"] = _not_empty
+    if option.completes:
+        about["shell_complete"] = getattr(completion, option.completes)
+    if option.usual:
+        text += f"  [default: {option.usual}]"
+    return click.option(*option.flags or (option.flag_of(name),), name, help=text, **about)
 
 
 def output_options(body: Body) -> Body:
@@ -396,13 +325,7 @@ def _not_empty(ctx: click.Context, param: click.Parameter, value: str | None) ->
 
 def threads_option(body: Body) -> Body:
     """Add --threads; the command gets ``threads``, None standing for every core it may use."""
-    return click.option(
-        "--threads",
-        type=WholeNumber(min=1),
-        metavar="N",
-        help="Compute with N threads. The result is the same for any N.  [default: all cores that"
-        " this process may use]",
-    )(body)
+    return _click_option("threads", declared(Run)["threads"])(body)
 
 
 def reporting_options(body: Body) -> Body:

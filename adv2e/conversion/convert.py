@@ -2,55 +2,40 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from adv2e.config import Written, files_among, load_config
-from adv2e.conversion.pipeline import Summary, convert_reading
-from adv2e.conversion.reading import Reading
-from adv2e.conversion.transfer import convert_events
-from adv2e.errors import Adv2eWarning, UsageError
-from adv2e.formats.frames import takes_events
-from adv2e.geometry import parse_rectangle, parse_size
+from adv2e.errors import DataError, UsageError, warn
 from adv2e.in_python import in_python
-from adv2e.sources.paths import SensorPath
-from adv2e.sources.times.rates import Rate
+from adv2e.options import (
+    ConvertOptions,
+    CopyOptions,
+    SimulatedOutput,
+    SourceOptions,
+    chosen,
+    declared,
+    size_of,
+    takes,
+)
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from adv2e.config import Config, Written
+    from adv2e.conversion.pipeline import Summary
+    from adv2e.conversion.reading import Reading
+    from adv2e.geometry import Size
 
 
+@takes(ConvertOptions)
 def convert(
     source: str | Path,
     output: str | Path | None = None,
     config: Written | Sequence[Written] | None = None,
-    *,
-    fps: Rate | None = None,
-    timestamps: str | Path | None = None,
-    time_unit: str | None = None,
-    start_s: float | None = None,
-    stop_s: float | None = None,
-    t0: str = "auto",
-    allow_damaged: bool = False,
-    size: str | tuple[int, int] | None = None,
-    crop: str | tuple[int, int, int, int] | None = None,
-    bayer: str | None = None,
-    pixel_format: str | None = None,
-    rotate180: bool = False,
-    track: str | int | None = None,
-    set_back: str | None = None,
-    crop_events: bool = False,
-    format: str | None = None,
-    layout: str | None = None,
-    with_frames: bool = False,
-    overwrite: bool = False,
-    preview: str | Path | None = None,
-    causes: bool = False,
-    threads: int | None = None,
-    progress: bool = False,
-    take: str | None = None,
-    motion: str | None = None,
-    extent_px: float | None = None,
-    duration_s: float | None = None,
+    **options: Unpack[ConvertOptions],
 ) -> Summary:
     """Convert a video, a folder of images or a recording to a file of events.
 
@@ -64,54 +49,8 @@ def convert(
         File or folder to write; the suffix gives the format: .h5, .txt, .zip, or none for a
         DAVIS240C folder.  Default: ``<stem>.events.h5`` in the current folder.
     config : Config, or what :func:`adv2e.load_config` takes, optional
-    fps : str or number, optional
-        Frames a second, such as 30 or "30000/1001".
-    timestamps : str or Path, optional
-        List of the times of the frames, one a line.
-    time_unit : {'s', 'ms', 'us', 'ns'}, optional
-        Unit of the times in lists.
-    start_s, stop_s : float, optional
-        Part to convert [s after the first frame].
-    t0 : {'auto', 'zero', 'keep'}
-        Time of the first frame: zero, or as on the source's clock; auto: keep where it has one.
-    allow_damaged : bool
-        Take what can be decoded of a damaged video.
-    size : (int, int) or str, optional
-        Width and height of the sensor, such as "346x260": sensor.width and .height.
-    crop : (int, int, int, int) or str, optional
-        First column, first row, columns and rows of the part to cut out of the frames first.
-    bayer : {'RGGB', 'BGGR', 'GRBG', 'GBRG'}, optional
-        Frames are raw mosaics with these colours in the first two rows.
-    pixel_format : str, optional
-        Raw video of pixels of this kind comes through standard input; `size` is that of its frames.
-    rotate180 : bool
-        Turn frames and events by half a turn, before even that.
-    track : str or int, optional
-        Which one to read of several video tracks, streams or topics: its number from 0, or its
-        name.
-    set_back, crop_events
-        Of events: see :func:`adv2e.read_events`.
-    format, layout : str, optional
-        Format of the output where its suffix does not say it, and layout of HDF5.
-    with_frames : bool
-        Store the frames in HDF5, too.
-    overwrite : bool
-        Replace, at the end, an output that exists.
-    preview : str or Path, optional
-        Picture or film of the events to write beside.
-    causes : bool
-        Store what made each event, too: as a column of HDF5, else in ``<output>.causes.txt``.
-    threads : int, optional
-        Default: all cores.  The events do not depend on it.
-    progress : bool
-        Show a progress bar on stderr.
-    take : {'frames', 'events'}, optional
-        What to take of a source that holds both.  Default: the frames of cameras' recordings, the
-        events of other files.
-    motion : {'saccade', 'shake', 'pan'}, optional
-        The source is one picture, before which the sensor moves so; see :mod:`adv2e.sources.paths`.
-    extent_px, duration_s : float, optional
-        Length of the longer side of that path [pixels of the sensor], and of its time [s].
+    **options
+        See :class:`adv2e.options.ConvertOptions`.
 
     Returns
     -------
@@ -142,89 +81,123 @@ def convert(
     (346, 260, 4, True)
     >>> folder.cleanup()
     """
+    from adv2e.config import files_among, load_config  # noqa: PLC0415 - as below
+
     notes: list[str] = []
-    try:
-        wanted = None if size is None else parse_size(size)
-        part = None if crop is None else parse_rectangle(crop)
-    except ValueError as error:
-        raise UsageError(f"size, crop: {error}") from None
-
-    def doubt(text: str) -> None:
-        warnings.warn(in_python(text), Adv2eWarning, stacklevel=5)  # of who calls adv2e.convert
-
-    if fps is not None and timestamps is not None:
-        raise UsageError("fps and timestamps both give the times of the frames: keep one")
-    if motion is None and (extent_px is not None or duration_s is not None):
-        raise UsageError("extent_px and duration_s are of the path that motion makes")
-    if takes_events(Path(source), take, track):
-        simulated = {
-            **{"config": config, "fps": fps, "timestamps": timestamps, "preview": preview},
-            **{"bayer": bayer, "pixel_format": pixel_format, "motion": motion},
-            "allow_damaged": allow_damaged or None,
-        }
-        if given := [name for name, value in simulated.items() if value is not None]:
-            raise UsageError(f"{source} holds events, nothing is simulated: leave out {given[0]}")
-        if output is None:
-            raise UsageError("output is missing: say what to write the events to")
-        summary = convert_events(
-            str(source),
-            str(output),
-            size=wanted,
-            crop=part,
-            rotate180=rotate180,
-            track=track,
-            set_back=set_back,
-            crop_events=crop_events,
-            time_unit=time_unit,
-            start_s=start_s,
-            stop_s=stop_s,
-            t0=t0,
-            format=format,
-            layout=layout,
-            with_frames=with_frames,
-            overwrite=overwrite,
-            causes=causes,
-            threads=threads,
-            progress=progress,
-            log=notes.append,
-            doubt=doubt,
-        )
-        return replace(summary, notes=tuple(map(in_python, notes)))
-    if set_back or crop_events:
-        raise UsageError(f"{source}: set_back and crop_events are for events, not for frames")
-    ready = load_config(config, size=None if part and pixel_format else wanted)
-    reading = Reading(
+    summary = convert_input(
         str(source),
-        fps=fps,
-        timestamps=timestamps,
-        time_unit=time_unit,
-        start_s=start_s,
-        stop_s=stop_s,
-        t0=t0,
-        allow_damaged=allow_damaged,
-        crop=part,
-        bayer=bayer,
-        pixel_format=pixel_format,
-        frame_size=wanted,
-        rotate180=rotate180,
-        track=track,
-        along=None if motion is None else SensorPath(motion, extent_px, duration_s),
-        threads=threads,
+        None if output is None else str(output),
+        lambda size: load_config(config, size=size),
+        configured="" if config is None else "config",
+        also_read=lambda: files_among(config),
+        log=notes.append,
+        doubt=lambda text: warn(in_python(text)),
+        **options,
     )
-    with reading:
-        summary = convert_reading(
-            reading,
-            None if output is None else str(output),
-            config=ready,
-            format=format,
-            layout=layout,
-            with_frames=with_frames,
-            overwrite=overwrite,
-            preview=None if preview is None else str(preview),
-            causes=causes,
-            progress=progress,
-            also_read=files_among(config),
-            log=notes.append,
-            doubt=doubt,
-        )
     return replace(summary, notes=tuple(map(in_python, notes)))
+
+
+@takes(ConvertOptions)
+def convert_input(
+    source: str,
+    output: str | None,
+    config: Callable[[Size | None], Config],
+    *,
+    configured: str = "",
+    also_read: Callable[[], Iterable[str | Path]] = tuple,
+    log: Callable[[str], None],
+    doubt: Callable[[str], None] | None = None,
+    begin: Callable[[], None] = lambda: None,
+    ready: Callable[[Reading, Config], None] = lambda reading, config: None,
+    capturing: str | None = None,
+    **options: Unpack[ConvertOptions],
+) -> Summary:
+    """Do what :func:`convert` does; errors name options of the command line.
+
+    Parameters
+    ----------
+    source, output
+        See :func:`convert`.
+    config : callable
+        Returns the configuration for a sensor of a size.  It is called once the frames are read
+        ahead: configurations know of all effects, and importing these takes its time.
+    configured : str
+        Name of the option that gives a configuration, if one does.
+    also_read : callable
+        Returns the files that the configuration is made of, which must not be written over.
+    log, doubt : callable
+        Take lines for people; `doubt` those that ask for a look, by default `log`.
+    begin : callable
+        Is called first of all where frames are simulated.
+    ready : callable
+        Is called with the open input and the configuration before the simulation.
+    capturing : str, optional
+        What is told where Ctrl-C ends the frames of a pipe; default: it ends the conversion.
+    **options
+        See :class:`adv2e.options.ConvertOptions`.
+    """
+    if _takes_events(source, options, configured):
+        from adv2e.conversion.transfer import convert_events  # noqa: PLC0415 - no kernel, fast
+
+        if output is None:
+            raise UsageError("-o OUT is missing: say what to write the events to")
+        copied = chosen(CopyOptions, options)
+        return convert_events(source, output, log=log, doubt=doubt, **copied)
+    if options["set_back"] or options["crop_events"]:
+        raise DataError(
+            f"{source}: its frames are simulated: --set-back and --crop-events are for events,"
+            " leave them out"
+        )
+    begin()
+    from adv2e.conversion.reading import Reading  # noqa: PLC0415 - as above
+
+    reading = Reading(source, threads=options["threads"], **chosen(SourceOptions, options))
+    # it reads while all else that is needed is imported
+    with reading, nullcontext() if capturing is None else reading.capturing(capturing):
+        from adv2e.conversion.pipeline import convert_reading  # noqa: PLC0415
+
+        of_raw_video = options["crop"] is not None and options["pixel_format"] is not None
+        ready_config = config(None if of_raw_video else size_of(options))
+        ready(reading, ready_config)
+        return convert_reading(
+            reading,
+            output,
+            config=ready_config,
+            progress=options["progress"],
+            also_read=also_read(),
+            log=log,
+            doubt=doubt,
+            **chosen(SimulatedOutput, options),
+        )
+
+
+_SIMULATED = (
+    *("fps", "timestamps", "allow_damaged", "bayer", "pixel_format", "motion", "preview"),
+)
+"""Options that say how frames are simulated."""
+
+
+def _takes_events(source: str, options: ConvertOptions, configured: str) -> bool:
+    """Tell whether to copy the events of the source, without a simulation.
+
+    Raises
+    ------
+    DataError
+        Events are copied, but options of a simulation are given.
+    """
+    from adv2e.formats.lookup import may_hold_events  # noqa: PLC0415 - as above
+
+    if options["take"] is None and not may_hold_events(Path(source)):
+        return False
+    from adv2e.formats.frames import takes_events  # noqa: PLC0415
+
+    if not takes_events(Path(source), options["take"], options["track"]):
+        return False
+    known = declared(ConvertOptions)
+    given = [known[name].flag_of(name) for name in _SIMULATED if options.get(name)]
+    for flag in filter(None, [configured, *given]):
+        raise DataError(
+            f"{source}: its events are written, nothing is simulated: leave out {flag}, or take its"
+            " frames, if it has any, with --from frames"
+        )
+    return True

@@ -14,16 +14,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from adv2e.config import Written, load_config
-from adv2e.conversion.reading import READING
 from adv2e.effects.pixel.initial_reference import RANDOM
 from adv2e.errors import UsageError
 from adv2e.files.states import free_bytes, state_of
 from adv2e.formats.frames import open_frames
-from adv2e.geometry import parse_rectangle
+from adv2e.options import ConvertOptions, SourceOptions, chosen, takes
 from adv2e.sources.base import Source
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 MUCH = 10_000_000_000
 """Bytes to be made that are told before the work begins."""
@@ -92,14 +94,14 @@ def may_be_much(source: Source) -> bool:
     return int(frames * source.width * source.height) >= _LARGE
 
 
+@takes(ConvertOptions)
 def estimate(
     source: str | Path,
     output: str | Path,
     config: Written | Sequence[Written] | None = None,
     *,
-    threads: int | None = None,
     share: float = math.inf,
-    **options: Any,
+    **options: Unpack[ConvertOptions],
 ) -> Estimate | None:
     """Return about how much a conversion will make and take; None where nobody can tell.
 
@@ -112,12 +114,10 @@ def estimate(
     output : str or Path
         What would be written.
     config : Config, or what :func:`adv2e.load_config` takes, optional
-    threads : int, optional
-        Threads that the conversion will have.
     share : float
         Of the frames, that may be converted for it; some are converted several times.
     **options
-        Further arguments of :func:`adv2e.convert`, but for those of the output.
+        See :class:`adv2e.options.ConvertOptions`.
 
     Raises
     ------
@@ -126,13 +126,10 @@ def estimate(
     """
     from adv2e.conversion.convert import convert  # noqa: PLC0415 - most conversions ask nothing
 
-    if options.get("pixel_format") is not None or options.get("motion") is not None:
+    if options["pixel_format"] is not None or options["motion"] is not None:
         raise UsageError("estimates are of files and folders of frames")
     config = load_config([load_config(config), {"pixel": {"initial_reference": RANDOM}}])
-    reading = {name: options[name] for name in READING if options.get(name) is not None}
-    if options.get("crop") is not None:
-        reading["crop"] = parse_rectangle(options["crop"])
-    opened = open_frames(source, **reading)
+    opened = open_frames(source, **chosen(SourceOptions, options))
     if opened.count is None:
         return None
     intervals = opened.count - 1
@@ -154,16 +151,19 @@ def estimate(
         def part(begin: int, count: int) -> _Part:
             end = min(begin + count, len(times_s) - 1)
             margin_s = (times_s[end] - times_s[begin]) / (4 * (end - begin))
-            wanted = {
+            wanted: ConvertOptions = {
                 **options,
                 "start_s": max(0.0, times_s[begin] - margin_s),
                 "stop_s": times_s[end] + margin_s,
                 "take": "frames",
+                "overwrite": True,
+                "preview": None,
+                "progress": False,
             }
             target = Path(folder) / Path(output).name
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # the whole conversion tells them
-                made = convert(source, target, config, overwrite=True, threads=threads, **wanted)
+                made = convert(source, target, config, **wanted)
             return _Part(made.frames - 1, made.events, state_of(target).bytes, made.seconds)
 
         part(0, 2)  # compiles, and reads what is not in memory

@@ -39,11 +39,14 @@ from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.interpolation import network_of
 from adv2e.light.pictures import drawn, picture_white
 from adv2e.light.sensor import fitting_of
+from adv2e.options import SimulatedOutput, takes
 from adv2e.process import bars
 from adv2e.sources import STDIN
 from adv2e.sources.base import Source
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
     from adv2e.light.sensor import Fitting
     from adv2e.rendering.timeline import Timeline
 
@@ -146,21 +149,17 @@ def default_output(source: str, format: str | None = None) -> str:
     return f"{name if path.is_dir() else Path(name).stem}.events{suffix}"
 
 
+@takes(SimulatedOutput)
 def convert_reading(
     reading: Reading,
     output: str | None,
     *,
     config: Config,
-    format: str | None = None,
-    layout: str | None = None,
-    with_frames: bool = False,
-    overwrite: bool = False,
-    preview: str | None = None,
-    causes: bool = False,
     progress: bool = False,
     also_read: Iterable[str | Path] = (),
     log: Callable[[str], None] = lambda text: None,
     doubt: Callable[[str], None] | None = None,
+    **options: Unpack[SimulatedOutput],
 ) -> Summary:
     """Convert one video, image sequence or recording to events.
 
@@ -171,19 +170,14 @@ def convert_reading(
     output : str, optional
         Output path ("-": text to stdout; None: see :func:`default_output`).
     config : Config
-    format, layout, with_frames, overwrite
-        See :func:`adv2e.formats.writing.open_sink`; DAVIS240C folders and zips always hold the
-        frames.
-    preview : str, optional
-        Picture or film of the events to write beside.
-    causes : bool
-        Store what made each event, too.
     progress : bool
         Show a progress bar on stderr.
     also_read : iterable of str or Path
         Files that `config` is made of, which must not be written over.
     log, doubt : callable
         Take lines for people; `doubt` those that ask for a look, by default `log`.
+    **options
+        See :class:`adv2e.options.SimulatedOutput`.
 
     Raises
     ------
@@ -194,8 +188,10 @@ def convert_reading(
     doubt = doubt or log
     recording, workers = reading.source, reading.threads
     decoder, fitting = decoding_of(recording, config)
+    format, layout, causes = options["format"], options["layout"], options["causes"]
     target = output or default_output(reading.path, format)
     chosen = to_write(Path(target), format, layout)
+    with_frames, preview = options["with_frames"], options["preview"]
     if with_frames:
         check_frames(chosen)
     keeps_all_bits = chosen.is_davis240c
@@ -205,7 +201,7 @@ def convert_reading(
     width, height = frames if fitting is None else fitting.size
     # events and preview come into place together, when all is written
     inputs = (*reading.inputs, *also_read)
-    with Staging(overwrite, inputs) as staging, ExitStack() as stack:
+    with Staging(options["overwrite"], inputs) as staging, ExitStack() as stack:
         sink = stack.enter_context(
             open_sink(
                 target,
@@ -353,7 +349,7 @@ def _metadata(
 
 
 def _open_preview(
-    preview: str | None, width: int, height: int, staging: Staging, stack: ExitStack
+    preview: str | Path | None, width: int, height: int, staging: Staging, stack: ExitStack
 ) -> Timeline | None:
     if preview is None:
         return None

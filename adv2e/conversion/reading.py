@@ -21,26 +21,20 @@ from adv2e.background import default_threads, read_ahead
 from adv2e.effects.frames.brightness import check_floats, check_light
 from adv2e.errors import Adv2eError, DataError
 from adv2e.formats.frames import open_frames
-from adv2e.geometry import Rectangle, Size
 from adv2e.light.pictures import picture_of
+from adv2e.options import SourceOptions, takes
 from adv2e.sources import STDIN
 from adv2e.sources.base import Source
 from adv2e.sources.frame import Frame
-from adv2e.sources.paths import SensorPath
-from adv2e.sources.times.rates import Rate
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
     from adv2e.effects.frames.encoding import LightDecoder
     from adv2e.light.sensor import Fitting
 
 AHEAD_BYTES, AHEAD_FRAMES = 16 << 20, 256
 """Memory for frames that were decoded and not taken yet, light and what is seen of them."""
-
-READING = (
-    *("fps", "timestamps", "time_unit", "start_s", "stop_s", "t0", "allow_damaged", "bayer"),
-    *("rotate180", "track"),
-)
-"""Arguments of a conversion that a :class:`Reading` takes as they are."""
 
 EARLY_BYTES = 32 << 20
 """Memory for frames that were read before it was known what they are to become."""
@@ -112,41 +106,19 @@ class Reading:
 
     Parameters
     ----------
-    path, fps, timestamps, start_s, stop_s, t0, time_unit, allow_damaged, crop, bayer,
-    pixel_format, frame_size, rotate180, along, track
-        See :func:`adv2e.sources.open_source`.
+    path : str
     threads : int, optional
         Threads that the whole conversion may compute with; default: all cores.
+    **options
+        See :func:`adv2e.sources.open_source`.
     """
 
+    @takes(SourceOptions)
     def __init__(
-        self,
-        path: str,
-        *,
-        fps: Rate | None = None,
-        timestamps: str | Path | None = None,
-        time_unit: str | None = None,
-        start_s: float | None = None,
-        stop_s: float | None = None,
-        t0: str = "auto",
-        allow_damaged: bool = False,
-        crop: Rectangle | None = None,
-        bayer: str | None = None,
-        pixel_format: str | None = None,
-        frame_size: Size | None = None,
-        rotate180: bool = False,
-        along: SensorPath | None = None,
-        track: str | int | None = None,
-        threads: int | None = None,
+        self, path: str, *, threads: int | None = None, **options: Unpack[SourceOptions]
     ) -> None:
-        self.path = path
+        self.path, self.options = path, options
         self.threads = threads or default_threads()
-        self.given: dict[str, Any] = {
-            "fps": fps, "timestamps": timestamps, "start_s": start_s, "stop_s": stop_s, "t0": t0,
-            "time_unit": time_unit, "allow_damaged": allow_damaged, "crop": crop,
-            "bayer": bayer, "pixel_format": pixel_format, "frame_size": frame_size,
-            "rotate180": rotate180, "along": along, "track": track,
-        }  # fmt: skip
         self._opened: Source | Adv2eError | None = None
         self._decoding: Future[Decoding] = Future()
         self._stills: Iterator[Still] = iter(())
@@ -175,7 +147,7 @@ class Reading:
     def inputs(self) -> tuple[str | Path, ...]:
         """Files that are read: those of the source, and the list of times if there is one."""
         source = () if self.path == STDIN else self.source.inputs
-        return *source, *filter(None, [self.given["timestamps"]])
+        return *source, *filter(None, [self.options["timestamps"]])
 
     def capturing(self, told: str) -> AbstractContextManager[None]:
         """Return a context within which Ctrl-C ends a pipe's frames, as `told`; see `Source`."""
@@ -188,7 +160,7 @@ class Reading:
 
     def __enter__(self) -> Reading:
         try:
-            source = self._opened = open_frames(self.path, **self.given)
+            source = self._opened = open_frames(self.path, **self.options)
         except Adv2eError as error:  # the other parts of the command may be wrong, too
             self._opened = error
             return self

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 import threading
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from contextlib import nullcontext
 from typing import Any
@@ -21,7 +20,7 @@ from adv2e.effects.frames.brightness import bounded, check_floats
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Frames, Hooks
 from adv2e.effects.reorder_buffer import InOrder
-from adv2e.errors import Adv2eWarning, DataError, UsageError
+from adv2e.errors import DataError, UsageError, warn
 from adv2e.events import Events, empty_events
 from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.intervals import Intervals
@@ -202,11 +201,9 @@ def _instants(times: Any, fps: Rate | None) -> tuple[Iterable[float], bool]:
 
 def _tell_far_apart(apart_s: float) -> None:
     if apart_s >= _FAR_APART_S:
-        warnings.warn(
+        warn(
             f"the second frame comes {apart_s:g} s after the first: times are in seconds; divide"
-            " milliseconds by 1e3, microseconds by 1e6",
-            Adv2eWarning,
-            stacklevel=2,
+            " milliseconds by 1e3, microseconds by 1e6"
         )
 
 
@@ -256,9 +253,7 @@ def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
     decoder = decoder_for(config.frames, image.dtype, colour, auto=light.encoding)
     if config.frames.encoding == "auto" and light.is_guess:
         taken = light_text(light, decoder.full_scale, config.frames)
-        warnings.warn(
-            f"frames are {taken}", Adv2eWarning, stacklevel=4
-        )  # of who loops over adv2e.simulate
+        warn(f"frames are {taken}")
     return decoder
 
 

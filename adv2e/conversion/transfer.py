@@ -12,7 +12,7 @@ from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +35,13 @@ from adv2e.formats.sink import Sink
 from adv2e.formats.writing import open_sink
 from adv2e.geometry import Rectangle
 from adv2e.light.pictures import picture_of, picture_white
+from adv2e.options import CopyOptions, EventInput, chosen, crop_of, takes
 from adv2e.process import bars
 from adv2e.sources.frame import Light, Pixels
 from adv2e.sources.wanted import Selection
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 _MADE = ("adv2e", "versions", "config", "seed", "effects", "network", "source")
 """Metadata of a file of ours on the making of its events, which stay true of a copy."""
@@ -86,29 +90,14 @@ class _Part:
         return image[y : y + height, x : x + width]
 
 
+@takes(CopyOptions)
 def convert_events(
     path: str,
     output: str,
     *,
-    size: tuple[int, int] | None = None,
-    crop: Rectangle | None = None,
-    time_unit: str | None = None,
-    rotate180: bool = False,
-    track: str | int | None = None,
-    set_back: str | None = None,
-    crop_events: bool = False,
-    start_s: float | None = None,
-    stop_s: float | None = None,
-    t0: str = "auto",
-    format: str | None = None,
-    layout: str | None = None,
-    with_frames: bool = False,
-    overwrite: bool = False,
-    causes: bool = False,
-    threads: int | None = None,
-    progress: bool = False,
     log: Callable[[str], None] = lambda text: None,
     doubt: Callable[[str], None] | None = None,
+    **options: Unpack[CopyOptions],
 ) -> Summary:
     """Write the events of a file to another, of any format.
 
@@ -118,31 +107,10 @@ def convert_events(
         Event file, or folder.
     output : str
         Output path ("-": text to stdout).
-    size : (int, int), optional
-        Width and height of the sensor [pixels]; default: what the file states, or the largest
-        coordinates.
-    crop : Rectangle, optional
-        Column and row of the first pixel that is kept, columns and rows.
-    time_unit : {'s', 'ms', 'us', 'ns'}, optional
-        Unit of the times in the file.
-    rotate180 : bool
-        Turn events and frames by half a turn, before they are cut.
-    track : str or int, optional
-        Which one to read of several streams: its number from 0, or its name.
-    set_back, crop_events
-        See :func:`adv2e.read_events`.
-    start_s, stop_s : float, optional
-        First and last time wanted, from the first event [s]; both inclusive.
-    t0 : {'auto', 'keep', 'zero'}
-        auto, keep: times stay; zero: from the first event, or from `start_s` after it.
-    format, layout, with_frames, overwrite, threads
-        See :func:`adv2e.formats.writing.open_sink`.
-    causes : bool
-        Store the causes of the events, too, which the file must have.
-    progress : bool
-        Show a progress bar on stderr.
     log, doubt : callable
         Take lines for people; `doubt` those that ask for a look, by default `log`.
+    **options
+        See :class:`adv2e.options.CopyOptions`.  Of `t0`, auto is keep: times stay.
 
     Raises
     ------
@@ -150,20 +118,13 @@ def convert_events(
         For anything wrong with input or output; then no output file is left.
     """
     began = time.perf_counter()
-    selection = Selection(start_s, stop_s, t0)
-    chosen = to_write(Path(output), format, layout)
+    selection = Selection(options["start_s"], options["stop_s"], options["t0"])
+    with_frames, causes = options["with_frames"], options["causes"]
+    chosen_format = to_write(Path(output), options["format"], options["layout"])
     if with_frames:
-        check_frames(chosen)
-    keeps_all_bits = chosen.is_davis240c
-    file = open_events(
-        path,
-        time_unit=time_unit,
-        size=size,
-        rotate180=rotate180,
-        track=track,
-        set_back=set_back,
-        crop_events=crop_events,
-    )
+        check_frames(chosen_format)
+    keeps_all_bits = chosen_format.is_davis240c
+    file = open_events(path, **chosen(EventInput, options))
     facts = file.facts
     if with_frames and file.shots is None:
         raise DataError(f"{path}: holds events and no frames: leave --with-frames out")
@@ -171,12 +132,12 @@ def convert_events(
         raise DataError(
             f"{path}: its events have no causes; only 'adv2e convert --causes' has them"
         )
-    with _bar(path, progress) as facts.progress:
+    with _bar(path, options["progress"]) as facts.progress:
         found, first_us, parts = events_in_order(file)
-        part = _part(path, found, first_us, selection, crop)
+        part = _part(path, found, first_us, selection, crop_of(options))
         width, height = part.crop[2:]
         frames = file.shots is not None and (with_frames or keeps_all_bits)
-        with Staging(overwrite, file.inputs) as staging, ExitStack() as stack:
+        with Staging(options["overwrite"], file.inputs) as staging, ExitStack() as stack:
             sink = stack.enter_context(
                 open_sink(
                     output,
@@ -191,11 +152,10 @@ def convert_events(
                         ),
                         **({"causes": CAUSES} if causes else {}),
                     },
-                    format=format,
-                    layout=layout,
-                    overwrite=overwrite,
+                    format=options["format"],
+                    layout=options["layout"],
                     with_frames=frames,
-                    threads=threads,
+                    threads=options["threads"],
                     staging=staging,
                     causes=causes,
                 )

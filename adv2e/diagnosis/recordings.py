@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from adv2e.config import Config, Written, files_among, load_config, names_of, written_keys
 from adv2e.config.user_effects import user_effects
@@ -17,31 +17,22 @@ from adv2e.diagnosis.diagnose import diagnose as diagnose_evidence
 from adv2e.diagnosis.fitting.library import names
 from adv2e.diagnosis.known_light import read_known_light
 from adv2e.errors import UsageError
-from adv2e.geometry import Rectangle, parse_rectangle
+from adv2e.options import DiagnoseOptions, EventInput, chosen, crop_of, size_of, takes
 from adv2e.process import bars
 from adv2e.reports.files import check_folder, write_reports
 from adv2e.reports.result import Diagnosis
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
+
+@takes(DiagnoseOptions)
 def diagnose(
     recording: str | Path,
     declared: Written | Sequence[Written] | None = None,
     *,
-    light: str | Path | None = None,
     output: str | Path | None = None,
-    without: Sequence[str] = (),
-    fit_thresholds: bool = False,
-    time_unit: str | None = None,
-    rotate180: bool = False,
-    track: str | int | None = None,
-    start_s: float | None = None,
-    stop_s: float | None = None,
-    crop: str | tuple[int, int, int, int] | None = None,
-    set_back: str | None = None,
-    crop_events: bool = False,
-    overwrite: bool = False,
-    threads: int | None = None,
-    progress: bool = False,
+    **options: Unpack[DiagnoseOptions],
 ) -> Diagnosis:
     """Find what a recording holds that its simulation lacks.
 
@@ -54,33 +45,11 @@ def diagnose(
         of any format.
     declared : Config, or what :func:`adv2e.load_config` takes, optional
         What is known of the camera.  A `sensor` must have the size of the recording.
-    light : str or Path, optional
-        Table of what the light was, in the place of frames: see
-        :mod:`adv2e.diagnosis.known_light`.
     output : str or Path, optional
         Folder for report.html, report.json and model.yaml.  Default: none is written.
-    without : sequence of str
-        Effects that are not to be tried.
-    fit_thresholds : bool
-        The contrast thresholds are not known: they are fitted first.
-    time_unit : {'s', 'ms', 'us', 'ns'}, optional
-        Unit of the times in lists.
-    rotate180 : bool
-        Turn frames and events by half a turn, as for a camera that was mounted upside down.
-    track : str or int, optional
-        Which one to read of several streams: its number from 0, or its name.
-    start_s, stop_s : float, optional
-        Part to look at [s after the first frame].
-    crop : (int, int, int, int) or str, optional
-        First column, first row, columns and rows of the part of the sensor to look at.
-    set_back, crop_events
-        See :func:`adv2e.read_events`.
-    overwrite : bool
-        Replace the folder of an earlier report.
-    threads : int, optional
-        Default: all cores.  The result does not depend on it.
-    progress : bool
-        Show the stage and the number of simulations on stderr.
+    **options
+        See :class:`adv2e.options.DiagnoseOptions`, and :mod:`adv2e.diagnosis.known_light` for
+        `light`.
 
     Returns
     -------
@@ -101,34 +70,18 @@ def diagnose(
     ('explained', ['refractory'])
     >>> dead_time = load_config(found.model).pixel.refractory.period_us
     """
-    try:
-        part = None if crop is None else parse_rectangle(crop)
-    except ValueError as error:
-        raise UsageError(f"crop: {error}") from None
     return diagnose_file(
         recording,
-        load_config(declared),
+        load_config(declared, size=size_of(options)),
         name=names_of(declared),
         written=written_keys(declared),
         also_read=files_among(declared),
-        light=light,
         output=output,
-        without=without,
-        fit_thresholds=fit_thresholds,
-        part=(start_s, stop_s, part),
-        reading={
-            "time_unit": time_unit,
-            "rotate180": rotate180,
-            "track": track,
-            "set_back": set_back,
-            "crop_events": crop_events,
-        },
-        overwrite=overwrite,
-        threads=threads,
-        progress=progress,
+        **options,
     )
 
 
+@takes(DiagnoseOptions)
 def diagnose_file(
     recording: str | Path,
     declared: Config,
@@ -136,45 +89,40 @@ def diagnose_file(
     name: str,
     written: Collection[str],
     also_read: Iterable[str | Path],
-    light: str | Path | None,
     output: str | Path | None,
-    without: Sequence[str],
-    fit_thresholds: bool,
-    part: tuple[float | None, float | None, Rectangle | None],
-    reading: dict[str, Any],
-    overwrite: bool,
-    threads: int | None,
-    progress: bool,
     say: Callable[[str], None] | None = None,
     log: Callable[[str], None] = lambda text: None,
+    **options: Unpack[DiagnoseOptions],
 ) -> Diagnosis:
     """Do what :func:`diagnose` does, with a configuration that was loaded.
 
     `name` and `written` are what it was made from and the keys that somebody wrote; `also_read` are
-    files that must not be written over; `reading` is for :func:`adv2e.read_events`, and `part` what
-    of the recording is looked at (:func:`adv2e.diagnosis.data.evidence.part_of`); `log` takes lines
-    for people, and `say` those that tell now and then how far it is, where no bar does.
+    files that must not be written over; `log` takes lines for people, and `say` those that tell now
+    and then how far it is, where no bar does.
     """
+    light, without, overwrite = options["light"], options["without"], options["overwrite"]
+    reading = chosen(EventInput, options)
+    del reading["size"]  # that of the sensor is in the configuration
     check_names(without, names(declared))
     _check_own_names(declared)
     declared = without_user_effects(declared, written)
     if output is not None:
         inputs = [recording, *([] if light is None else [light]), *also_read]
         check_folder(output, overwrite=overwrite, inputs=inputs)
-    with _stages(progress, say) as tell:
+    with _stages(options["progress"], say) as tell:
         evidence = (
             read_evidence(recording, declared.sensor, **reading)
             if light is None
             else read_known_light(recording, light, declared.sensor, **reading)
         )
-        evidence = part_of(evidence, *part)
+        evidence = part_of(evidence, options["start_s"], options["stop_s"], crop_of(options))
         found = diagnose_evidence(
             evidence,
             declared,
             declared_name=name or "the defaults",
             without=without,
-            free_thresholds=fit_thresholds,
-            threads=threads,
+            free_thresholds=options["fit_thresholds"],
+            threads=options["threads"],
             written=written,
             progress=lambda now: tell(now.stage, now.simulations),
             log=log,

@@ -5,41 +5,45 @@ What an input with both is converted from, its frames or its events, is settled 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from adv2e.errors import DataError, UsageError
 from adv2e.files.zips import Members
 from adv2e.formats.event_file import EventFile
 from adv2e.formats.lookup import format_of, may_hold_events
 from adv2e.formats.reading import open_events
+from adv2e.options import SourceOptions, takes
 from adv2e.sources import STDIN, open_source
 from adv2e.sources.base import Source
 from adv2e.sources.listed import ListedSource, Picture, Timed, timed
 from adv2e.sources.stored import EVENTS
 from adv2e.sources.wanted import GivenTimes, Selection
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
-def open_frames(path: str | Path, **given: Any) -> Source:
+
+@takes(SourceOptions)
+def open_frames(path: str | Path, **options: Unpack[SourceOptions]) -> Source:
     """Open an input with frames; parameters and errors as :func:`adv2e.sources.open_source`."""
     named = Path(path)
-    other = given.get("pixel_format") is not None or given.get("along") is not None
+    other = options["pixel_format"] is not None or options["motion"] is not None
     if (
         other
         or not (named.exists() and may_hold_events(named))
         or format_of(named).is_davis240c  # a source of its own: it may come without events
     ):
-        return open_source(path, **given)
-    listed = given.get("timestamps")
-    times = GivenTimes(given.get("fps"), Path(listed) if listed else None, given.get("time_unit"))
-    wanted = ("start_s", "stop_s", "t0", "allow_damaged", "crop", "bayer")
-    selection = Selection(**{name: given[name] for name in wanted if name in given})
-    turn = given.get("rotate180", False)
+        return open_source(path, **options)
+    turn, track = options["rotate180"], options["track"]
+    times = GivenTimes.of(options)
+    selection = replace(Selection.of(options), rotate180=False, track=None)  # the file sees to them
     if turn and selection.bayer is not None:
         raise DataError(f"{path}: --bayer is not known of frames that --rotate180 turns: give one")
     # a list that the user gives has times of its own, which are those of the unit
     unit = None if times.timestamps else times.time_unit
-    file = open_events(path, time_unit=unit, rotate180=turn, track=given.get("track"))
+    file = open_events(path, time_unit=unit, rotate180=turn, track=track)
     if file.shots is None:
         raise DataError(f"{path}: holds events and no frames")
     return _source(file, times, selection)

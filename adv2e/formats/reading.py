@@ -7,49 +7,45 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from adv2e.errors import DataError, UsageError
+from adv2e.errors import DataError
 from adv2e.files.names import beside
 from adv2e.files.regular import check_ends
 from adv2e.formats.assembly import assemble
 from adv2e.formats.causes import beside as beside_of_causes
 from adv2e.formats.causes import found_beside
-from adv2e.formats.clock import SET_BACK
 from adv2e.formats.event_file import Columns, EventFile, Facts, Progress, rotated180
 from adv2e.formats.lookup import format_of
 from adv2e.formats.recording import Recording
 from adv2e.geometry import MOST_PIXELS
+from adv2e.options import EventInput, size_of, takes
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.frame import Shot
 from adv2e.sources.tracks import Track
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 __all__ = ["Recording", "open_events", "read_events"]
 
 Loaded = TypeVar("Loaded")
 
 
+@takes(EventInput)
 def open_events(
-    path: str | Path,
-    *,
-    time_unit: str | None = None,
-    progress: Progress | None = None,
-    size: tuple[int, int] | None = None,
-    rotate180: bool = False,
-    track: str | int | None = None,
-    set_back: str | None = None,
-    crop_events: bool = False,
+    path: str | Path, *, progress: Progress | None = None, **options: Unpack[EventInput]
 ) -> EventFile:
     """Open an event file, or a folder in the DAVIS240C layout; its events are not read yet.
 
     Parameters
     ----------
-    path, time_unit, progress, rotate180, track, set_back, crop_events
+    path, progress
         See :func:`read_events`.
-    size : (int, int), optional
-        Width and height [pixels] that hold whatever the file states.
+    **options
+        See :class:`adv2e.options.EventInput`.
 
     Raises
     ------
@@ -57,18 +53,17 @@ def open_events(
         As :func:`read_events`.
     """
     path = Path(path)
-    if set_back not in (None, *SET_BACK):
-        raise UsageError(f"set_back {set_back!r}: must be one of {', '.join(SET_BACK)}")
+    time_unit, track = options["time_unit"], options["track"]
     facts = Facts(
         path,
         time_unit,
         progress,
-        rotate180=rotate180,
+        rotate180=options["rotate180"],
         track=None if track is None else str(track),
-        set_back=set_back,
-        crop_events=crop_events,
+        set_back=options["set_back"],
+        crop_events=options["crop_events"],
     )
-    facts.state(size, "--size")
+    facts.state(size_of(options), "--size")
     with _reading(path):
         check_ends(path)
         if not path.exists():
@@ -85,19 +80,12 @@ def open_events(
         facts.inputs.append(beside_of_causes(path))
         inside = found.load(found.causes)(path) if found.causes else None
     file = _named(replace(file, causes=inside or found_beside(path)))
-    return rotated180(file) if rotate180 else file
+    return rotated180(file) if options["rotate180"] else file
 
 
+@takes(EventInput)
 def read_events(
-    path: str | Path,
-    *,
-    time_unit: str | None = None,
-    progress: Progress | None = None,
-    size: tuple[int, int] | None = None,
-    rotate180: bool = False,
-    track: str | int | None = None,
-    set_back: str | None = None,
-    crop_events: bool = False,
+    path: str | Path, *, progress: Progress | None = None, **options: Unpack[EventInput]
 ) -> Recording:
     r"""Read an event file, or a folder in the DAVIS240C layout.
 
@@ -105,21 +93,10 @@ def read_events(
     ----------
     path : str or Path
         Its suffix and its first bytes tell the format: see :mod:`adv2e.formats.registry`.
-    time_unit : {'s', 'ms', 'us', 'ns'}, optional
-        Unit of the times; default: see :mod:`adv2e.formats.units`.
     progress : callable, optional
         Is called now and then with two numbers: how much was read, and of how much.
-    size : (int, int), optional
-        Width and height of the sensor [pixels], whatever the file states.
-    rotate180 : bool
-        Turn events and frames by half a turn, as for a camera that was mounted upside down.
-    track : str or int, optional
-        Which one to read of several streams: its number from 0, or its name.
-    set_back : {'continue', 'sort'}, optional
-        What to do where times go back by more than 0.1 s: go on from the time before, as where a
-        clock was reset, or sort the events by time.  Default: an error.
-    crop_events : bool
-        Leave out events outside the sensor, however many.  Default: more than 1 % are an error.
+    **options
+        See :class:`adv2e.options.EventInput`.
 
     Returns
     -------
@@ -146,16 +123,7 @@ def read_events(
     >>> recording.width, recording.height, recording.frame_times_ns is None
     (4, 3, True)
     """
-    file = open_events(
-        path,
-        time_unit=time_unit,
-        progress=progress,
-        size=size,
-        rotate180=rotate180,
-        track=track,
-        set_back=set_back,
-        crop_events=crop_events,
-    )
+    file = open_events(path, progress=progress, **options)
     recording = assemble(file)
     _check_size(recording)
     return recording

@@ -11,7 +11,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ import numpy as np
 from adv2e import __version__
 from adv2e.background import default_threads
 from adv2e.causes import CAUSED_DTYPE, has_causes
-from adv2e.errors import Adv2eWarning, DataError
+from adv2e.errors import DataError, warn
 from adv2e.events import EVENT_DTYPE, Events, checked_events
 from adv2e.files.staging import Staging
 from adv2e.formats.causes import check_numbers
@@ -151,7 +150,7 @@ def write_events(
     if recording is not None:
         events, size = recording.events, size or (recording.width, recording.height)
         if recording.frame_times_ns is not None:
-            warnings.warn(_NO_FRAMES, Adv2eWarning, stacklevel=3)  # of who calls adv2e.write_events
+            warn(_NO_FRAMES)
         if metadata is None:
             metadata = {key: value for key, value in recording.metadata.items() if key != "frames"}
     if size is None:

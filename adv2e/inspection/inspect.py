@@ -4,41 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.effects.frames.encoding import full_scale_of
-from adv2e.errors import DataError
+from adv2e.errors import DataError, UsageError
 from adv2e.files.names import shown
 from adv2e.files.regular import check_ends
 from adv2e.files.zips import Members
 from adv2e.formats.lookup import may_hold_events
 from adv2e.formats.reading import Recording, read_events
-from adv2e.geometry import Size
 from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.light.decoding import light_text
+from adv2e.options import EventInput, FrameInput, InfoOptions, chosen, declared, takes
 from adv2e.sources import OPENERS, PICTURES, STDIN, Source, open_source
 from adv2e.sources.frame import Light
 from adv2e.sources.stored import EVENTS, LIST
-from adv2e.sources.times.rates import Rate
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
+@takes(InfoOptions)
 def info(
     path: str | Path,
     *,
-    fps: Rate | None = None,
-    timestamps: str | Path | None = None,
-    time_unit: str | None = None,
-    allow_damaged: bool = False,
-    bayer: str | None = None,
-    pixel_format: str | None = None,
-    frame_size: Size | None = None,
-    rotate180: bool = False,
-    track: str | int | None = None,
-    set_back: str | None = None,
     progress: Callable[[int, int | None], None] | None = None,
+    **options: Unpack[InfoOptions],
 ) -> dict[str, Any]:
     """Return the content of a recording, an event file or an input with frames, ready for JSON.
 
@@ -46,19 +40,11 @@ def info(
     ----------
     path : str or Path
         Any file or folder that can be compared or converted.
-    fps, timestamps
-        Times of frames, see :func:`adv2e.sources.open_source`; for inputs without events.
-    time_unit
-        See :func:`adv2e.sources.open_source`; for all inputs.
-    allow_damaged : bool
-        Damage of a video becomes one of the problems.
-    bayer, pixel_format, frame_size
-        See :func:`adv2e.sources.open_source`.
-    rotate180, track, set_back
-        See :func:`adv2e.read_events`.  Events outside the sensor are told, however many.
     progress : callable, optional
         Is called now and then with two numbers: how much was read, and of how much, where that is
         known.
+    **options
+        See :class:`adv2e.options.InfoOptions`.  Events outside the sensor are told, however many.
 
     Returns
     -------
@@ -86,36 +72,19 @@ def info(
     path = Path(path)
     check_ends(path)
     if str(path) == STDIN or _has_only_frames(path):
-        source = open_source(
-            path,
-            fps=fps,
-            timestamps=timestamps,
-            time_unit=time_unit,
-            allow_damaged=allow_damaged,
-            bayer=bayer,
-            pixel_format=pixel_format,
-            frame_size=frame_size,
-            rotate180=rotate180,
-            track=track,
-        )
+        if options["size"] is not None and options["pixel_format"] is None:
+            raise UsageError(
+                "--size is that of raw video here, of which --pixel-format says the rest: frames"
+                " are described as they are"
+            )
+        source = open_source(path, **chosen(FrameInput, options))
         return _of_source(source, progress or (lambda done, total: None))
-    of_frames = {
-        "--fps": fps, "--timestamps": timestamps, "--bayer": bayer,
-        "--pixel-format": pixel_format, "--allow-damaged": allow_damaged or None,
-    }  # fmt: skip
-    for option in (name for name, value in of_frames.items() if value is not None):
-        raise DataError(f"{path}: its events are described: leave {option} out")
-    return _of_recording(
-        read_events(
-            path,
-            time_unit=time_unit,
-            progress=progress,
-            rotate180=rotate180,
-            track=track,
-            set_back=set_back,
-            crop_events=True,
-        )
-    )
+    for name in ("fps", "timestamps", "bayer", "pixel_format", "allow_damaged"):
+        if options.get(name):
+            flag = declared(InfoOptions)[name].flag_of(name)
+            raise DataError(f"{path}: its events are described: leave {flag} out")
+    reading: EventInput = {**chosen(EventInput, options), "crop_events": True}
+    return _of_recording(read_events(path, progress=progress, **reading))
 
 
 def _has_only_frames(path: Path) -> bool:

@@ -5,17 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from adv2e.errors import OutputError
 from adv2e.files.staging import Staging
+from adv2e.options import FilmOptions, takes
 from adv2e.rendering.films import Film, PictureOutput, Sheet, check_suffix, replacing
 from adv2e.rendering.styles import Style
-from adv2e.rendering.timeline import MOST_PICTURES, Caption, Timeline, caption
+from adv2e.rendering.timeline import Caption, Timeline, caption
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 SHEET_STEP_US = 1000
 """Instants between which a sheet chooses, at first; later they are further apart."""
 
 
+@takes(FilmOptions)
 @contextmanager
 def open_preview(
     path: str | Path,
@@ -23,17 +29,12 @@ def open_preview(
     height: int,
     *,
     style: Style | None = None,
-    fps: float = 30.0,
-    speed: float = 1.0,
-    count: int = 6,
-    scale: int | None = None,
-    overwrite: bool = False,
     instants_us: Sequence[int] | None = None,
     start_us: int | None = None,
     frames: bool | None = None,
     caption: Caption = caption,
     staging: Staging | None = None,
-    max_pictures: int = MOST_PICTURES,
+    **options: Unpack[FilmOptions],
 ) -> Iterator[Timeline]:
     """Give the body what takes events and frames, and write them as a film or a sheet.
 
@@ -48,20 +49,12 @@ def open_preview(
         Size of the sensor [pixels].
     style : Style, optional
         Without it, a film draws every event, in one picture, and a sheet windows of 20 ms.
-    fps : float
-        Pictures a second of a film.
-    speed : float
-        Recorded seconds a second of film; 0.1 is ten times slower than life.
-    count : int
-        Most instants on a sheet that is not told which.
-    scale : int, optional
-        How often a pixel is repeated; by default, panels are made about 640 columns wide.
-    overwrite : bool
-        Replace a file that exists.
-    instants_us, start_us, frames, caption, max_pictures
+    instants_us, start_us, frames, caption
         See :class:`adv2e.rendering.timeline.Timeline`.
     staging : Staging, optional
         Takes the file together with others; it says whether a file that exists is replaced.
+    **options
+        See :class:`adv2e.options.FilmOptions`.
 
     Raises
     ------
@@ -72,12 +65,13 @@ def open_preview(
     """
     path = Path(path)
     is_sheet = check_suffix(path) == ".png"
-    step_us = SHEET_STEP_US if is_sheet else max(1.0, 1e6 * speed / fps)
+    fps, scale = options["fps"], options["scale"]
+    step_us = SHEET_STEP_US if is_sheet else max(1.0, 1e6 * options["speed"] / fps)
     style = style or (Style() if is_sheet else Style(window_us=round(step_us)))
-    with replacing(path, overwrite, staging) as unfinished:
+    with replacing(path, options["overwrite"], staging) as unfinished:
         output: PictureOutput
         if is_sheet:
-            shown = count if instants_us is None else len(instants_us)
+            shown = options["count"] if instants_us is None else len(instants_us)
             output = Sheet(unfinished, shown, style, scale)
         else:
             output = Film(unfinished, fps, style, scale)
@@ -93,7 +87,7 @@ def open_preview(
                 frames=frames,
                 caption=caption,
                 folder=unfinished.parent,
-                max_pictures=max_pictures,
+                max_pictures=options["max_pictures"],
             )
             with closing(timeline):
                 yield timeline

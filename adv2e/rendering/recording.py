@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,35 +12,30 @@ import numpy as np
 from adv2e.errors import DataError
 from adv2e.files.states import check_distinct
 from adv2e.light.pictures import drawn_frame
+from adv2e.options import FilmOptions, RenderedPart, chosen, takes
 from adv2e.process import bars
 from adv2e.rendering.preview import open_preview
 from adv2e.rendering.styles import Style
-from adv2e.rendering.timeline import MOST_PICTURES, Caption, Timeline, caption
+from adv2e.rendering.timeline import Caption, Timeline, caption
 from adv2e.ticks import microseconds
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
     from adv2e.formats.reading import Recording
 
 _CHUNK = 1 << 18  # events handed on at once where no frames divide them
 
 
+@takes(RenderedPart)
 def render_recording(
     recording: Recording,
     path: str | Path,
     *,
     style: Style | None = None,
-    fps: float = 30.0,
-    speed: float = 1.0,
-    at_s: Sequence[float] = (),
-    count: int = 6,
-    start_s: float = 0.0,
-    stop_s: float | None = None,
     frames: bool = True,
-    scale: int | None = None,
     caption: Caption = caption,
-    overwrite: bool = False,
-    progress: bool = False,
-    max_pictures: int = MOST_PICTURES,
+    **options: Unpack[RenderedPart],
 ) -> None:
     """Write a film (.mp4, .webm, .avi, .gif) or a contact sheet (.png) of `recording`.
 
@@ -49,17 +44,10 @@ def render_recording(
     recording : Recording
     path : str or Path
         Output.
-    at_s : sequence of float
-        Instants of a sheet [s after the first event or frame]; none: up to `count`, about evenly
-        spaced.
-    start_s, stop_s : float
-        Part to show [s after the first event or frame].
-    style, fps, speed, frames, scale, caption, overwrite
+    style, frames, caption
         See :func:`open_preview`.
-    progress : bool
-        Show a progress bar on stderr.
-    max_pictures : int
-        Most pictures of a film.
+    **options
+        See :class:`adv2e.options.RenderedPart`.
 
     Raises
     ------
@@ -69,6 +57,8 @@ def render_recording(
     OutputError, UsageError
         See :func:`open_preview`.
     """
+    start_s, stop_s, at_s = options["start_s"], options["stop_s"], options["at_s"]
+    most = options["max_pictures"]
     check_distinct(path, recording.inputs)
     has_frames = recording.frame_times_ns is not None and recording.frame_times_ns.size > 0
     if not (len(recording) or has_frames):
@@ -89,7 +79,7 @@ def render_recording(
         instants = [begin_us + round(time * 1e6) for time in sorted(at_s)]
         if instants and instants[-1] > until_us:
             raise DataError(f"{lasts}, the instant {max(at_s):g} s is after the end")
-    elif (pictures := (until_us - first_us) * 1e-6 * fps / speed) > max_pictures:
+    elif (pictures := (until_us - first_us) * 1e-6 * options["fps"] / options["speed"]) > most:
         number = f"{pictures:,.0f}" if pictures < 1e12 else f"{pictures:.1e}"
         raise DataError(
             f"{lasts}, of which a film has {number} pictures: 'adv2e info' tells gaps that a wrong"
@@ -100,18 +90,13 @@ def render_recording(
         recording.width,
         recording.height,
         style=style,
-        fps=fps,
-        speed=speed,
-        count=count,
         instants_us=instants or None,
         start_us=first_us,
         frames=frames,
-        scale=scale,
         caption=lambda since_us, shown: caption(since_us + first_us - begin_us, shown),
-        overwrite=overwrite,
-        max_pictures=max_pictures,
+        **chosen(FilmOptions, options),
     ) as preview:
-        _feed(preview, recording, first_us, until_us, frames, progress)
+        _feed(preview, recording, first_us, until_us, frames, options["progress"])
 
 
 def _feed(

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -15,34 +14,24 @@ from numpy.typing import NDArray
 from adv2e.errors import UsageError
 from adv2e.events import checked_events
 from adv2e.formats.reading import Recording, read_events
+from adv2e.options import EventInput, RenderedPart, RenderOptions, chosen, size_of, takes
 from adv2e.rendering.films import check_suffix
 from adv2e.rendering.recording import render_recording
 from adv2e.rendering.styles import Style, parse_colour
-from adv2e.rendering.timeline import MOST_PICTURES
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 _SHEET_WINDOW_MS = 20.0
 
 
+@takes(RenderOptions)
 def render(
     events: str | Path | Recording | NDArray[Any],
     output: str | Path | None = None,
     *,
-    size: tuple[int, int] | None = None,
-    style: str = "white",
-    on_color: str = "red",
-    off_color: str = "blue",
-    window_ms: float | None = None,
-    fps: float = 30.0,
-    speed: float = 1.0,
-    start_s: float = 0.0,
-    stop_s: float | None = None,
-    at_s: Sequence[float] = (),
-    count: int = 6,
     frames: bool = True,
-    scale: int | None = None,
-    overwrite: bool = False,
-    progress: bool = False,
-    max_pictures: int = MOST_PICTURES,
+    **options: Unpack[RenderOptions],
 ) -> NDArray[np.uint8] | None:
     """Draw a film (.mp4, .webm, .avi, .gif) or a sheet of pictures (.png) of events.
 
@@ -52,35 +41,11 @@ def render(
         A file, what :func:`adv2e.read_events` returned, or the events themselves.
     output : str or Path, optional
         File to write; its suffix says what to make.  Without one, a sheet is returned.
-    size : (int, int), optional
-        Width and height of the sensor [pixels].  An array needs it, nothing else takes it.
-    style : {'white', 'black', 'grey', 'surface'}
-        Colours on white or black; grey: net count; surface: colours that fade with age.
-    on_color, off_color : str
-        Name or #rrggbb.
-    window_ms : float, optional
-        Length of what one picture shows [ms].  Default: in a film, all since the picture before;
-        on a sheet 20.
-    fps : float
-        Pictures a second of a film.
-    speed : float
-        Recorded seconds a second of film; 0.1 is ten times slower than life.
-    start_s, stop_s : float, optional
-        Part to show [s after the first event or frame].
-    at_s : sequence of float
-        Instants of a sheet [s]; none: up to `count`, about evenly spaced.
-    count : int
-        Instants of a sheet without `at_s`.
     frames : bool
         Show the frames beside the events, where there are any.
-    scale : int, optional
-        How often a pixel is repeated; default: panels are about 640 columns wide.
-    overwrite : bool
-        Replace a file that exists.
-    progress : bool
-        Show a progress bar on stderr.
-    max_pictures : int
-        Most pictures of a film: a wrong time would make far too many.
+    **options
+        See :class:`adv2e.options.RenderOptions`.  An array needs `size`; how to read a file is for
+        files alone.
 
     Returns
     -------
@@ -115,31 +80,13 @@ def render(
         if path is None:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="adv2e-render-"))
             path = Path(folder) / "events.png"
-        chosen = chosen_style(
-            path,
-            style,
-            on_color,
-            off_color,
-            window_ms=window_ms,
-            fps=fps,
-            speed=speed,
-            at_s=at_s,
-        )
+        recording = _recording(events, chosen(EventInput, options))
         render_recording(
-            _recording(events, size),
+            recording,
             path,
-            style=chosen,
-            fps=fps,
-            speed=speed,
-            at_s=at_s,
-            count=count,
-            start_s=start_s,
-            stop_s=stop_s,
+            style=chosen_style(path, options),
             frames=frames,
-            scale=scale,
-            overwrite=overwrite,
-            progress=progress,
-            max_pictures=max_pictures,
+            **chosen(RenderedPart, options),
         )
         if output is not None:
             return None
@@ -147,39 +94,33 @@ def render(
         return np.ascontiguousarray(picture[:, :, ::-1], np.uint8)
 
 
-def chosen_style(
-    output: str | Path,
-    name: str,
-    on_color: str,
-    off_color: str,
-    *,
-    window_ms: float | None,
-    fps: float,
-    speed: float,
-    at_s: Sequence[float],
-) -> Style:
+def chosen_style(output: str | Path, options: RenderOptions) -> Style:
     """Return the style of the pictures; parameters and errors as for :func:`render`."""
     is_film = check_suffix(output) != ".png"
-    if at_s and is_film:
+    if options["at_s"] and is_film:
         raise UsageError(
             f"{output}: instants (--at) are for a .png; --start and --stop choose part of a film"
         )
-    usual_ms = 1e3 * speed / fps if is_film else _SHEET_WINDOW_MS
+    usual_ms = 1e3 * options["speed"] / options["fps"] if is_film else _SHEET_WINDOW_MS
     return Style(
-        name=name,
-        on=parse_colour(on_color),
-        off=parse_colour(off_color),
-        window_us=max(1, round(1e3 * (window_ms or usual_ms))),
+        name=options["style"],
+        on=parse_colour(options["on_color"]),
+        off=parse_colour(options["off_color"]),
+        window_us=max(1, round(1e3 * (options["window_ms"] or usual_ms))),
     )
 
 
-def _recording(
-    events: str | Path | Recording | NDArray[Any], size: tuple[int, int] | None
-) -> Recording:
-    if not isinstance(events, np.ndarray):
-        if size is not None:
-            raise UsageError("size: a file says its own; only an array of events needs it")
-        return events if isinstance(events, Recording) else read_events(events)
+def _recording(events: str | Path | Recording | NDArray[Any], reading: EventInput) -> Recording:
+    """Return the recording to draw; UsageError if options do not fit what it is made of."""
+    if isinstance(events, (str, Path)):
+        return read_events(events, **reading)
+    is_array = isinstance(events, np.ndarray)
+    for name, value in reading.items():
+        if value and not (is_array and name == "size"):
+            raise UsageError(f"{name}: is of the reading of a file: leave it out")
+    if isinstance(events, Recording):
+        return events
+    size = size_of(reading)
     if size is None:
         raise UsageError("size: an array of events needs the width and height of the sensor")
     return Recording("events", "array", *size, checked_events(events, *size))

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import importlib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from adv2e.errors import DataError, UsageError
 from adv2e.files.regular import check_ends
-from adv2e.geometry import Rectangle, Size
+from adv2e.options import SourceOptions, size_of, takes
 from adv2e.sources.base import Source
 from adv2e.sources.frame import Frame
 from adv2e.sources.paths import SensorPath
-from adv2e.sources.times.rates import Rate
 from adv2e.sources.wanted import GivenTimes, Selection
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 __all__ = ["Frame", "Source", "open_source"]
 
@@ -38,24 +41,8 @@ OPENERS = {
 """Module whose ``open_source(path, given, selection)`` reads files of a suffix."""
 
 
-def open_source(
-    path: str | Path,
-    *,
-    fps: Rate | None = None,
-    timestamps: str | Path | None = None,
-    start_s: float | None = None,
-    stop_s: float | None = None,
-    t0: str = "auto",
-    time_unit: str | None = None,
-    allow_damaged: bool = False,
-    crop: Rectangle | None = None,
-    bayer: str | None = None,
-    pixel_format: str | None = None,
-    frame_size: Size | None = None,
-    rotate180: bool = False,
-    along: SensorPath | None = None,
-    track: str | int | None = None,
-) -> Source:
+@takes(SourceOptions)
+def open_source(path: str | Path, **options: Unpack[SourceOptions]) -> Source:
     """Open an input with frames.
 
     Parameters
@@ -63,35 +50,9 @@ def open_source(
     path : path
         Video file, folder or zip of images, recording of a data set, TIFF of several pages,
         or ``.npy`` stack; "-" is standard input, through which Y4M or raw video comes.
-    fps : float, Fraction or str, optional
-        Frames are at this constant rate [Hz], whatever the source says; ``30000/1001`` is exact.
-    timestamps : path, optional
-        File with the time of each frame, ``t`` or ``t name`` a line; see
+    **options
+        See :class:`adv2e.options.SourceOptions`.  Of a list, each line is ``t`` or ``t name``: see
         :mod:`adv2e.sources.times.lists`.
-    start_s, stop_s : float, optional
-        First and last time wanted, counted from the first frame [s]; both inclusive.
-    t0 : {'auto', 'keep', 'zero'}
-        auto, keep: times on the source's own clock where there is one, else from its first frame;
-        zero: from the first frame wanted.
-    time_unit : {'s', 'ms', 'us', 'ns'}, optional
-        Unit of the times in lists; default: see :mod:`adv2e.sources.times.units`.
-    allow_damaged : bool
-        Take what can be decoded of a damaged video, and tell what is missing.
-    crop : Rectangle, optional
-        Part to cut out of each frame, before anything else.
-    bayer : {'RGGB', 'BGGR', 'GRBG', 'GBRG'}, optional
-        Frames are mosaics of this pattern: they are made colour, before `crop`.
-    pixel_format : str, optional
-        Raw video comes through standard input, of pixels of this kind; see
-        :mod:`adv2e.sources.pipes.raw`.
-    frame_size : Size, optional
-        Size of the frames of raw video.
-    rotate180 : bool
-        Turn each frame by half a turn, before even that.
-    along : SensorPath, optional
-        The input is one picture, before which the sensor moves so.
-    track : str or int, optional
-        Which one to read of several tracks: its number from 0, or its name.
 
     Returns
     -------
@@ -105,13 +66,12 @@ def open_source(
     DataError
         If the input is missing, of an unknown kind, or wrong.
     """
-    listed = Path(timestamps) if timestamps is not None else None
-    given = GivenTimes(fps, listed, time_unit)
-    wanted = None if track is None else str(track)
-    selection = Selection(start_s, stop_s, t0, allow_damaged, crop, bayer, rotate180, wanted)
+    given, selection = GivenTimes.of(options), Selection.of(options)
+    along = SensorPath.of(options)
+    pixel_format, size = options["pixel_format"], size_of(options)
     if not str(path):
         raise DataError("the input has no name: give a video, a folder of images or a recording")
-    if pixel_format is not None and (str(path) != STDIN or frame_size is None):
+    if pixel_format is not None and (str(path) != STDIN or size is None):
         raise UsageError(
             "--pixel-format is for raw video through standard input: INPUT must be -, and --size"
             " WxH says the size of its frames"
@@ -121,7 +81,7 @@ def open_source(
             raise UsageError("--motion moves before one picture: INPUT must be its file")
         from adv2e.sources.pipes import source as pipe  # noqa: PLC0415  (needs OpenCV)
 
-        return pipe.open_source(given, selection, pixel_format=pixel_format, size=frame_size)
+        return pipe.open_source(given, selection, pixel_format=pixel_format, size=size)
     named, path = str(path), Path(path)
     try:
         check_ends(path)

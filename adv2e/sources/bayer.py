@@ -13,11 +13,11 @@ import cv2
 import numpy as np
 
 from adv2e.errors import DataError
+from adv2e.options import BAYER
 from adv2e.sources.frame import Light, Pixels, Shot
-from adv2e.sources.wanted import PATTERNS
 
 # OpenCV's own names are those of the second and third pixel of the second row
-_CODES = {pattern: getattr(cv2, f"COLOR_Bayer{pattern}2RGB") for pattern in PATTERNS}
+_CODES = {pattern: getattr(cv2, f"COLOR_Bayer{pattern}2RGB") for pattern in BAYER}
 _SMALLEST = 4
 
 

@@ -29,6 +29,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from adv2e.errors import UsageError
+from adv2e.options import SourceOptions
 
 Offset = tuple[float, float]
 """Position of the sensor: columns to the right of the middle and rows below it [its pixels]."""
@@ -94,9 +95,15 @@ class SensorPath:
     extent_px: float | None = None
     duration_s: float | None = None
 
+    @classmethod
+    def of(cls, options: SourceOptions) -> SensorPath | None:
+        """Return the path that options say, if they do."""
+        kind = options["motion"]
+        if kind is None:
+            return None
+        return cls(kind, options["extent_px"], options["duration_s"])
+
     def __post_init__(self) -> None:
-        if self.kind not in PATHS:
-            raise UsageError(f"--motion: must be one of {', '.join(PATHS)}, got {self.kind!r}")
         for name, value in (("--extent", self.extent_px), ("--duration", self.duration_s)):
             if value is not None and not 0 < value < 1e6:
                 raise UsageError(f"{name}: must be above 0 and below a million, got {value:g}")

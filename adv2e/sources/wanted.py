@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from adv2e.errors import UsageError
 from adv2e.geometry import Rectangle
+from adv2e.options import FrameInput, SourceOptions, crop_of
 from adv2e.sources.times.rates import NS_PER_S, FrameRate, Rate, parse_rate
-from adv2e.sources.times.units import UNITS
-
-PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")
-"""Mosaics: colours of the first two pixels of the first row, then of the second."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +27,7 @@ class GivenTimes:
     Raises
     ------
     UsageError
-        If rate and file or rate and unit are given, or a value is impossible.
+        If the rate is impossible.
     """
 
     fps: Rate | None = None
@@ -37,17 +35,17 @@ class GivenTimes:
     time_unit: str | None = None
 
     def __post_init__(self) -> None:
-        if self.time_unit is not None and self.time_unit not in UNITS:
-            raise UsageError(f"--time-unit: must be s, ms, us or ns, got {self.time_unit!r}")
-        if self.fps is not None and self.time_unit is not None:
-            raise UsageError("--time-unit is for lists of times, which --fps replaces; give one")
-        if self.fps is not None and self.timestamps is not None:
-            raise UsageError("--fps and --timestamps both say when the frames are; give one")
         if self.fps is not None:
             try:
                 parse_rate(self.fps)
             except ValueError as error:
                 raise UsageError(f"--fps: {error}") from error
+
+    @classmethod
+    def of(cls, options: FrameInput) -> GivenTimes:
+        """Return what options say."""
+        listed = options["timestamps"]
+        return cls(options["fps"], Path(listed) if listed else None, options["time_unit"])
 
     @property
     def rate(self) -> FrameRate | None:
@@ -85,11 +83,6 @@ class Selection:
         Frames are wanted turned by half a turn, before they are cut.
     track : str, optional
         Track that is wanted, of several: its number or its name.
-
-    Raises
-    ------
-    UsageError
-        If a value is impossible.
     """
 
     start_s: float | None = None
@@ -101,18 +94,14 @@ class Selection:
     rotate180: bool = False
     track: str | None = None
 
-    def __post_init__(self) -> None:
-        for name, value in (("--start", self.start_s), ("--stop", self.stop_s)):
-            if value is not None and not (value >= 0 and math.isfinite(value)):
-                raise UsageError(f"{name}: must be seconds from the first frame, got {value:g}")
-        if self.start_s is not None and self.stop_s is not None and self.stop_s <= self.start_s:
-            raise UsageError(
-                f"--stop: must be after --start ({self.start_s:g} s), got {self.stop_s:g}"
-            )
-        if self.t0 not in ("auto", "keep", "zero"):
-            raise UsageError(f"--t0: must be auto, keep or zero, got {self.t0!r}")
-        if self.bayer not in (None, *PATTERNS):
-            raise UsageError(f"--bayer: must be one of {', '.join(PATTERNS)}, got {self.bayer!r}")
+    @classmethod
+    def of(cls, options: SourceOptions) -> Selection:
+        """Return what options say."""
+        given: dict[str, Any] = {item.name: options.get(item.name) for item in fields(cls)}
+        track = options["track"]
+        return cls(
+            **{**given, "crop": crop_of(options), "track": None if track is None else str(track)}
+        )
 
     @property
     def start_ns(self) -> int:

@@ -20,7 +20,6 @@ from adv2e.config.model import Pixel
 from adv2e.diagnosis.fitting.library import names
 from adv2e.effects import EFFECTS, STAGES
 from adv2e.formats import lookup
-from adv2e.sources.paths import SensorPath
 
 
 @pytest.mark.parametrize("option", ["--version", "-V"])
@@ -63,10 +62,10 @@ def test_examples_in_the_help_stand_line_by_line(adv2e, command):
 
 def test_the_help_of_convert_names_what_can_be_written(adv2e):
     out = " ".join(adv2e("convert", "--help").out.split())
-    named = re.search(r"Write this format, whatever the suffix: ([a-z0-9, ]+)\.", out)
+    named = re.search(r"Write this format, whatever the suffix. One of: ([a-z0-9, ]+)\.", out)
     assert re.split(", | or ", named[1]) == lookup.names()
     known = lookup.layouts()
-    assert f"Layout of an HDF5 output: {', '.join(known)}. [default: {known[0]}]" in out
+    assert f"Layout of an HDF5 output. One of: {', '.join(known)}. [default: {known[0]}]" in out
 
 
 def test_convert_passes_its_options_on(adv2e, pipeline):
@@ -89,7 +88,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
     assert outcome.status == 0
     ((reading, output, options),) = pipeline.calls
     assert (reading.path, output, reading.threads) == ("frames", "out.h5", 2)
-    assert reading.given == {
+    assert reading.options == {
         "fps": None,
         "timestamps": Path("t.txt"),
         "time_unit": "us",
@@ -100,9 +99,11 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "crop": (1, 2, 30, 20),
         "bayer": "GBRG",
         "pixel_format": None,
-        "frame_size": (8, 6),
+        "size": (8, 6),
         "rotate180": True,
-        "along": SensorPath("pan", 9.0),
+        "motion": "pan",
+        "extent_px": 9.0,
+        "duration_s": None,
         "track": "1",
     }
     log = options.pop("log")
@@ -116,6 +117,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "causes": True,
         "progress": True,
         "also_read": [find("ideal")],
+        "doubt": None,
     }
     assert log.level == 0
 
@@ -125,8 +127,8 @@ def test_convert_by_default(adv2e, pipeline):
     ((reading, output, options),) = pipeline.calls
     assert (reading.path, output, reading.threads) == ("clip.mp4", None, default_threads())
     assert options["config"] == Config()
-    assert reading.given.pop("t0") == "auto"
-    assert set(reading.given.values()) == {None, False}
+    assert reading.options.pop("t0") == "auto"
+    assert set(reading.options.values()) == {None, False}
     assert options["progress"] is False  # stderr is not a terminal here
     assert options["format"] is options["layout"] is None
 

@@ -21,7 +21,7 @@ from trees_of_batch import in_this_process
 from video_files import written
 from written_recordings import write_recording
 
-from adv2e.batch import processes
+from adv2e.batches import processes
 from adv2e.events import make_events
 from adv2e.formats.reading import read_events
 

@@ -268,7 +268,7 @@ def test_events_out_of_order_that_all_lie_outside_leave_none(adv2e, tmp_path):
 )
 def test_arguments_of_a_simulation_are_refused(option, tmp_path):
     write(tmp_path / "a.h5", events_of())
-    with pytest.raises(UsageError, match=f"nothing is simulated: leave out {next(iter(option))}"):
+    with pytest.raises(DataError, match=f"nothing is simulated: leave out {next(iter(option))}"):
         adv2e_convert("a.h5", "b.txt", **option)
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from trees_of_batch import in_this_process
 
-from adv2e.batch import processes
+from adv2e.batches import processes
 from adv2e.config import load_family
 from adv2e.conversion import demo
 from adv2e.diagnosis import prepare

@@ -14,7 +14,7 @@ ELSEWHERE = {
     r"\./scripts/test\b": "scripts/test",
     r"(git clone|cd) ": "scripts/test",
     r"sbatch ": "tests/documentation/test_array_of_jobs.py",
-    r"dask (scheduler|worker) ": "tests/batch/test_cluster.py",
+    r"dask (scheduler|worker) ": "tests/batches/test_cluster.py",
     r"python3? -m venv ": "scripts/environment.sh",
     r"(source|\.) \S+/activate$": "scripts/environment.sh",
 }

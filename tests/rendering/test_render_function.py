@@ -47,7 +47,7 @@ def test_the_command_draws_the_same(events, adv2e, tmp_path, monkeypatch):
         ("a.png", {"size": (4, 4)}, DataError, "events: number 4 has x 4, outside a sensor of 4x4"),
         ("a.doc", {"size": SIZE}, UsageError, r"a\.doc: a film ends in"),
         ("a.avi", {"size": SIZE, "at_s": [1]}, UsageError, r"a\.avi: instants \(at_s\) are for"),
-        ("a.png", {"size": SIZE, "style": "pink"}, UsageError, "style 'pink'"),
+        ("a.png", {"size": SIZE, "style": "pink"}, UsageError, "style: must be white, black"),
     ],
 )
 def test_what_cannot_be(events, tmp_path, output, given, error, text):
@@ -56,7 +56,14 @@ def test_what_cannot_be(events, tmp_path, output, given, error, text):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_says_its_own_size(events, tmp_path):
-    adv2e.write_events(tmp_path / "events.h5", events, SIZE)
-    with pytest.raises(UsageError, match="size: a file says its own"):
-        adv2e.render(tmp_path / "events.h5", tmp_path / "a.png", size=SIZE)
+def test_how_to_read_is_said_of_files_alone(events, tmp_path):
+    path = tmp_path / "events.h5"
+    adv2e.write_events(path, events, SIZE)
+    usual = adv2e.render(path, count=1, scale=1)
+    wide = adv2e.render(path, count=1, scale=1, size=(SIZE[0] + 7, SIZE[1]))
+    assert wide.shape[1] == usual.shape[1] + 7
+    recording = adv2e.read_events(path)
+    with pytest.raises(UsageError, match="size: is of the reading of a file"):
+        adv2e.render(recording, size=SIZE)
+    with pytest.raises(UsageError, match="time_unit: is of the reading of a file"):
+        adv2e.render(events, size=SIZE, time_unit="us")

@@ -8,10 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from adv2e.cli.options import BAYER
 from adv2e.errors import DataError, UsageError
+from adv2e.options import BAYER
 from adv2e.sources import open_source
-from adv2e.sources.wanted import PATTERNS
 
 ROWS, COLUMNS = np.mgrid[:12, :16]
 SCENE = np.stack([10 + 3 * COLUMNS, 120 + 5 * ROWS, 240 - 2 * COLUMNS - 4 * ROWS], -1)
@@ -41,7 +40,7 @@ def write(kind, folder, image):
     return folder
 
 
-@pytest.mark.parametrize("pattern", PATTERNS)
+@pytest.mark.parametrize("pattern", BAYER)
 @pytest.mark.parametrize(("dtype", "scale"), [(np.uint8, 1), (np.uint16, 257)])
 def test_each_pattern_gives_the_colours_of_the_scene(tmp_path, pattern, dtype, scale):
     path = write("npy", tmp_path / "a", mosaic(pattern, dtype, scale))
@@ -51,7 +50,7 @@ def test_each_pattern_gives_the_colours_of_the_scene(tmp_path, pattern, dtype, s
     for frame in source.frames():
         wrong = np.abs(frame.image.astype(int) - SCENE * scale)[INSIDE]
         assert wrong.max() <= 1
-    for other in set(PATTERNS) - {pattern}:
+    for other in set(BAYER) - {pattern}:
         frame = next(open_source(path, fps=10, bayer=other).frames())
         assert np.abs(frame.image.astype(int) - SCENE * scale)[INSIDE].max() > 20 * scale
 
@@ -65,7 +64,7 @@ def test_images_tiff_and_npy(tmp_path, kind):
 
 def test_the_corners_are_filled(tmp_path):
     path = write("npy", tmp_path / "a", np.full((12, 16), 77, np.uint8))
-    for pattern in PATTERNS:
+    for pattern in BAYER:
         assert np.all(next(open_source(path, fps=10, bayer=pattern).frames()).image == 77)
 
 
@@ -91,10 +90,9 @@ def test_a_video_has_colours_already(write_video, picture):
 
 def test_patterns_that_there_are_not(tmp_path, adv2e):
     path = write("npy", tmp_path / "a", mosaic("RGGB"))
-    with pytest.raises(UsageError, match="--bayer: must be one of RGGB, BGGR, GRBG, GBRG"):
+    with pytest.raises(UsageError, match="--bayer: must be RGGB, BGGR, GRBG or GBRG"):
         open_source(path, fps=10, bayer="RGBG")
     assert adv2e("convert", path, "--fps", "10", "--bayer", "RGBG").status == 2
-    assert BAYER == PATTERNS
 
 
 def test_the_command_line_says_what_they_were_taken_for(adv2e, tmp_path):

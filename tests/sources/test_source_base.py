@@ -96,7 +96,7 @@ def test_times_of_the_epoch_stay_exact(stack):
         ({"fps": float("nan")}, "--fps"),
         ({"fps": 25, "start_s": -1}, "--start"),
         ({"fps": 25, "stop_s": float("nan")}, "--stop"),
-        ({"fps": 25, "start_s": 2, "stop_s": 2}, "--stop: must be after"),
+        ({"fps": 25, "start_s": 2, "stop_s": 2}, "--stop 2 must be after"),
         ({"fps": 25, "t0": "now"}, "--t0"),
     ],
 )

@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adv2e.cli.options import PIXEL_FORMATS as NAMES
 from adv2e.errors import DataError, UsageError
 from adv2e.formats.reading import read_events
 from adv2e.geometry import Size
+from adv2e.options import PIXEL_FORMATS as NAMES
 from adv2e.sources import open_source
 from adv2e.sources.pipes.raw import PIXEL_FORMATS
 from adv2e.sources.pipes.source import open_source as open_pipe
@@ -210,14 +210,14 @@ def test_smallest_frames(picture):
     assert [int(frame.image[0, 0]) for frame in source.frames()] == list(range(9))
 
 
-def test_the_command_line_knows_the_same_names():
+def test_options_know_the_same_names():
     assert NAMES == PIXEL_FORMATS
 
 
 def test_raw_video_comes_through_standard_input_alone(tmp_path, write_images, picture):
     folder = write_images([picture(0), picture(1)])
     with pytest.raises(UsageError, match="INPUT must be -, and --size WxH says"):
-        open_source(folder, fps=10, pixel_format="gray", frame_size=Size(8, 6))
+        open_source(folder, fps=10, pixel_format="gray", size=Size(8, 6))
     with pytest.raises(UsageError, match="INPUT must be -, and --size WxH says"):
         open_source("-", fps=10, pixel_format="gray")
 

@@ -4,19 +4,29 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from collections.abc import Sequence as Many
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from adv2e import __version__
-from adv2e.export import e2vid, ev_segnet, voxels
-from adv2e.export.sequence import Sequence, open_sequences
-from adv2e.export.windows import MOST_EMPTY, Slice, before_images, between_images, by_count, by_time
+from adv2e.errors import UsageError, warn
+from adv2e.exporting import e2vid, ev_segnet, voxels
+from adv2e.exporting.sequence import Sequence, open_sequences
+from adv2e.exporting.windows import (
+    MOST_EMPTY,
+    Slice,
+    before_images,
+    between_images,
+    by_count,
+    by_time,
+)
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging, writing
 from adv2e.formats.assembly import events_in_order
+from adv2e.in_python import in_python
+from adv2e.options import EXPORTS, EventInput, ExportOptions, chosen, declared, takes
 
 DESCRIPTION = "export.json"
 """Name of the file that describes an export."""
@@ -58,6 +68,84 @@ class Exported:
             f"{shown(self.output)}: {self.items:,} {self.what} of {recordings}; took"
             f" {self.seconds:.1f} s"
         )
+
+
+@takes(ExportOptions, *EXPORTS.values())
+def export(
+    events: str | Path | Iterable[str | Path],
+    output: str | Path,
+    to: str,
+    *,
+    doubt: Callable[[str], None] = lambda text: warn(in_python(text)),
+    **options: Any,
+) -> Exported:
+    """Make a training set, or a representation, of event files or recordings.
+
+    Parameters
+    ----------
+    events : path, or iterable of paths
+        Measured or simulated.  For e2vid, ev-segnet, and windows at images they must hold images.
+    output : str or Path
+        Folder to write.
+    to : {'voxel', 'ev-segnet', 'e2vid'}
+        Voxel grids, pictures for Ev-SegNet, or a training set for E2VID.
+    doubt : callable
+        Takes lines for people that ask for a look; default: they are warnings.
+    **options
+        See :class:`adv2e.options.ExportOptions` and :data:`adv2e.options.EXPORTS`.
+
+    Returns
+    -------
+    Exported
+        Numbers of recordings and items.
+
+    Raises
+    ------
+    UsageError
+        Options do not fit what is made.
+    DataError, OutputError
+        Something is wrong with an input or the output; then nothing is left.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> from adv2e import export, write_events
+    >>> from adv2e.events import make_events
+    >>> events = make_events(t=[10, 20], x=[0, 3], y=[0, 2], p=[1, 0])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     clip, grids = os.path.join(folder, "a.h5"), os.path.join(folder, "grids")
+    ...     write_events(clip, events, (4, 3))
+    ...     export(clip, grids, "voxel", count=2).items
+    1
+    """
+    _check_kind(to, options)
+    paths = [events] if isinstance(events, (str, Path)) else list(events)
+    how = {**chosen(EventInput, options), "overwrite": options["overwrite"], "doubt": doubt}
+    if to == "e2vid":
+        return export_e2vid(paths, output, options["valid"], options["threads"], **how)
+    window_us = options["window_us"]
+    if to == "ev-segnet":
+        drawn = ev_segnet.SegmentationSettings(
+            options["split"], options["rows"], options["counts"] == "scaled"
+        )
+        return export_ev_segnet(paths, output, window_us or 50_000, drawn, **how)
+    names = ("bins", "normalise", "polarity", "span")
+    settings = voxels.VoxelSettings(**{name: options[name] for name in names})
+    cutting = Cutting(window_us, options["count"], options["at"] == "images")
+    most_empty = options["most_empty"]
+    return export_voxels(paths, output, cutting, settings, most_empty=most_empty, **how)
+
+
+def _check_kind(to: str, options: Mapping[str, Any]) -> None:
+    """Raise UsageError where options are missing, or do not fit what is made."""
+    if to not in EXPORTS:
+        raise UsageError(f"--to: must be one of {', '.join(EXPORTS)}, got {to!r}")
+    for name, option in declared(*EXPORTS.values()).items():
+        if name not in declared(EXPORTS[to]) and options[name] != option.default:
+            raise UsageError(f"{option.flag_of(name)} is not for --to {to}: leave it out")
+    cuts = [options[name] is not None for name in ("window_us", "count", "at")]
+    if to == "voxel" and sum(cuts) != 1:
+        raise UsageError("--to voxel needs one of --window TIME, --count N and --at images")
 
 
 def export_voxels(

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 import trees_of_batch as trees
 
-from adv2e.batch import sequences as module
-from adv2e.batch.sequences import LAYOUTS, find_sequences
-from adv2e.cli import batch as command
+from adv2e.batches.sequences import find_sequences
 from adv2e.errors import DataError
 
 
@@ -31,10 +29,6 @@ def tree(tmp_path):
 
 def names(root, layout="auto", **options):
     return [one.name for one in find_sequences(root, layout, **options).sequences]
-
-
-def test_layouts_are_those_of_the_command():
-    assert command.LAYOUTS == LAYOUTS
 
 
 def test_auto_takes_all_in_natural_order(tree):
@@ -102,7 +96,6 @@ def test_a_recording_that_is_none_is_left_out(tmp_path):
     trees.clip(tmp_path / "a.avi")
     (tmp_path / "b.aedat4").write_bytes(b"no such thing")
     assert names(tmp_path) == ["a"]
-    assert module.LAYOUTS[0] == "auto"
 
 
 def test_folders_of_pictures_count_where_their_times_are_known(tmp_path):

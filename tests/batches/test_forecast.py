@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from trees_of_batch import clip, last_of
 
-from adv2e.batch import forecast as module
-from adv2e.batch.plan import Task
-from adv2e.batch.sequences import Sequence
+from adv2e.batches import forecast as module
+from adv2e.batches.plan import Task
+from adv2e.batches.sequences import Sequence
 from adv2e.conversion.estimate import Estimate
 from adv2e.files.states import State, free_bytes
 
@@ -109,7 +109,7 @@ def test_looking_stops_at_a_tenth_of_what_it_tells(tmp_path, monkeypatch):
 def test_a_batch_tells_of_very_much_before_it_begins(batch, tmp_path, monkeypatch):
     clip(tmp_path / "from" / "a.avi", count=120)
     assert "about" not in batch(tmp_path / "from", tmp_path / "to").err
-    monkeypatch.setattr("adv2e.cli.batch._LARGE_SOURCE", 1)
+    monkeypatch.setattr("adv2e.batches.run._LARGE_SOURCE", 1)
     monkeypatch.setattr("adv2e.conversion.estimate.MUCH", 1)
     done = batch(tmp_path / "from", tmp_path / "to", "--overwrite")
     assert done.status == 0

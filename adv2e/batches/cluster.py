@@ -31,8 +31,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from adv2e import __version__
-from adv2e.batch.processes import EndedError, Workers
-from adv2e.batch.work import Job
+from adv2e.batches.processes import EndedError, Workers
+from adv2e.batches.work import Job
 from adv2e.errors import Adv2eError, DataError, MissingExtraError, UsageError
 from adv2e.files.regular import read_text_bytes
 from adv2e.files.states import state_of
@@ -94,7 +94,7 @@ class Proof:
 
 
 class Cluster:
-    """An engine (:data:`adv2e.batch.work.Engine`): the workers of a scheduler.
+    """An engine (:data:`adv2e.batches.work.Engine`): the workers of a scheduler.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ class Cluster:
         self._at_most, self._threads, self._log = at_most, threads, log
 
     def __call__(self, jobs: Iterable[Job], count: int) -> Iterator[tuple[Job, dict[str, Any]]]:
-        """Yield each job with what :func:`adv2e.batch.work.do` returned, as they end.
+        """Yield each job with what :func:`adv2e.batches.work.do` returned, as they end.
 
         Raises
         ------
@@ -338,7 +338,7 @@ _processes: list[Workers] = []
 
 
 def _do(job: Job, proof: Proof, texts: dict[str, bytes]) -> dict[str, Any]:
-    """Return the result of :func:`adv2e.batch.work.do`; or ``unfit``, with the reason."""
+    """Return the result of :func:`adv2e.batches.work.do`; or ``unfit``, with the reason."""
     from distributed import Reschedule, Status, get_worker  # noqa: PLC0415 - an extra
 
     worker = get_worker()

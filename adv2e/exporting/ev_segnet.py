@@ -26,7 +26,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.export.windows import Slice
+from adv2e.exporting.windows import Slice
 from adv2e.representations.event_images import event_image
 
 DDD17 = (346, 260)

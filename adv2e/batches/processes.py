@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import adv2e
-from adv2e.batch.work import Job, do
+from adv2e.batches.work import Job, do
 from adv2e.files.workspace import remove_abandoned
 from adv2e.process import cleanup
 from adv2e.process.signals import Terminated, stop_on_signals
@@ -50,7 +50,9 @@ def start() -> subprocess.Popen[bytes]:
     path = [place for place in sys.path if place not in ("", ".")]
     path += [] if home in path else [home]  # last: nothing in it can stand for another module
     # until the path is set nothing is imported but `sys`, which is no file
-    code = f"import sys; sys.path[:] = {path!a}; from adv2e.batch import processes as p; p.serve()"
+    code = (
+        f"import sys; sys.path[:] = {path!a}; from adv2e.batches import processes as p; p.serve()"
+    )
     told = ["-X", f"utf8={sys.flags.utf8_mode}"]  # or it would write names in other bytes
     told += ["-I"] if sys.flags.isolated else []
     return subprocess.Popen(
@@ -93,7 +95,7 @@ def _watch(parent: int) -> None:
 def run(jobs: Iterable[Job], count: int) -> Iterator[tuple[Job, dict[str, Any]]]:
     """Yield each job with what :func:`do` returned, as they end; `count` at a time.
 
-    See :data:`adv2e.batch.work.Engine`.
+    See :data:`adv2e.batches.work.Engine`.
     """
     workers = Workers(count)
     pool = ThreadPoolExecutor(count)

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from trees_of_batch import clip, last_of, lines_of, made_in
 
-from adv2e.batch import exports
-from adv2e.cli import batch as command
-from adv2e.export import export
-from adv2e.export.voxels import VoxelSettings
+from adv2e.exporting import export
+from adv2e.exporting.voxels import VoxelSettings
 
 
 @pytest.fixture
@@ -22,10 +20,6 @@ def source(tmp_path):
 
 def below(dest, folder):
     return {name: data for name, data in made_in(dest).items() if name.startswith(folder)}
-
-
-def test_the_command_offers_all_kinds():
-    assert command.EXPORTS == exports.KINDS
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from adv2e.batch.plan import Task
-from adv2e.batch.work import Job, config_of
+from adv2e.batches.plan import Task
+from adv2e.batches.work import Job, config_of
 from adv2e.conversion.estimate import Estimate, estimate
 from adv2e.errors import Adv2eError
 

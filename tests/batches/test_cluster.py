@@ -14,8 +14,8 @@ import pytest
 import trees_of_batch as trees
 from trees_of_batch import QUICK, clip, last_of, made_in
 
-from adv2e.batch import cluster as engine
-from adv2e.batch.cluster import Proof
+from adv2e.batches import cluster as engine
+from adv2e.batches.cluster import Proof
 
 pytest.importorskip("distributed")
 pytestmark = [

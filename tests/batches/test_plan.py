@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adv2e.batch.plan import parse_shard, seed_of, shard_of
+from adv2e.batches.plan import parse_shard, seed_of, shard_of
 from adv2e.errors import UsageError
 from adv2e.files.states import State, digest_of, state_of
 

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from adv2e.export.windows import Slice
+from adv2e.exporting.windows import Slice
 from adv2e.representations.voxel_grid import (
     Grid,
     own_window,

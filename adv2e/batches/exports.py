@@ -11,7 +11,6 @@ from typing import Any
 from adv2e.files.staging import Staging, writing
 from adv2e.files.states import digest_of
 
-KINDS = ("e2vid", "voxel", "ev-segnet")
 _VALID_SHARE = 0.2
 _LISTS = ("e2vid-train.txt", "e2vid-valid.txt")
 
@@ -23,7 +22,7 @@ class Export:
     Attributes
     ----------
     kind : str
-        One of :data:`KINDS`.
+        One of :data:`adv2e.options.EXPORTS`.
     window_us : int, optional
         Length of the windows [us]; default: for voxel grids, from each image to the next, for
         Ev-SegNet, 50 ms before each.
@@ -54,8 +53,8 @@ class Export:
         Adv2eError
             Something is wrong with the file; then nothing is left.
         """
-        from adv2e.export import export  # noqa: PLC0415 - in the process that converts
-        from adv2e.export.voxels import VoxelSettings  # noqa: PLC0415
+        from adv2e.exporting import export  # noqa: PLC0415 - in the process that converts
+        from adv2e.exporting.voxels import VoxelSettings  # noqa: PLC0415
 
         how: dict[str, Any] = {"overwrite": True, "doubt": doubt}
         if self.kind == "e2vid":  # which ones are for validation, the lists of the batch say

@@ -39,8 +39,6 @@ from adv2e.sources.images.source import LISTS, UNREAD, found_list, natural_key
 from adv2e.sources.images.stack import Pages
 from adv2e.sources.times.rates import Rate
 
-LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "images", "videos")
-
 _DDD = ("ddd", "ddd20")
 _PAGES = (".tif", ".tiff")
 _TEXTS = (".txt", ".csv")
@@ -58,7 +56,7 @@ class Sequence:
     source : Path
         File or folder.
     layout : str
-        Which of LAYOUTS it was found as; ``auto`` for others.
+        Which of :data:`adv2e.options.LAYOUTS` it was found as; ``auto`` for others.
     """
 
     name: str
@@ -96,7 +94,7 @@ def find_sequences(
     root : Path
         Folder, or a single file.
     layout : str
-        One of LAYOUTS.
+        One of :data:`adv2e.options.LAYOUTS`.
     leave_out : Path, optional
         Folder in which nothing is looked for: that of the results.
     fps : float, Fraction or str, optional

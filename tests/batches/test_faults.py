@@ -14,8 +14,8 @@ import pytest
 import trees_of_batch as trees
 from trees_of_batch import QUICK, clip, last_of, lines_of, made_in
 
-from adv2e.batch import processes
-from adv2e.batch.work import do
+from adv2e.batches import processes
+from adv2e.batches.work import do
 
 pytestmark = [
     pytest.mark.thorough,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from adv2e.batch.exports import Export
+from adv2e.batches.exports import Export
 from adv2e.config import Config, from_dict
 from adv2e.config.user_effects import load_effects
 from adv2e.errors import Adv2eError, is_for_users

@@ -6,7 +6,7 @@ import pytest
 import trees_of_batch as trees
 from trees_of_batch import clip, last_of, lines_of, made_in
 
-from adv2e.batch.plan import seed_of
+from adv2e.batches.plan import seed_of
 from adv2e.formats.reading import read_events
 
 

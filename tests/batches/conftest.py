@@ -3,7 +3,7 @@
 import pytest
 from trees_of_batch import QUICK, in_this_process
 
-from adv2e.batch import processes
+from adv2e.batches import processes
 
 
 @pytest.fixture

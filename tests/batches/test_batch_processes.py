@@ -11,10 +11,10 @@ import pytest
 import trees_of_batch as trees
 from trees_of_batch import QUICK, clip, in_this_process, made_in
 
-from adv2e.batch import processes
-from adv2e.batch.processes import run
-from adv2e.batch.run import Batch, Settings
-from adv2e.batch.work import Job
+from adv2e.batches import processes
+from adv2e.batches.processes import run
+from adv2e.batches.run import Batch, Settings
+from adv2e.batches.work import Job
 from adv2e.config import load_config, to_dict
 from adv2e.config.user_effects import load_effects
 
@@ -108,7 +108,7 @@ def test_a_script_that_calls_for_a_batch_runs_once(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(
         "from pathlib import Path\n"
-        "from adv2e.batch.run import Batch, Settings\n"
+        "from adv2e.batches.run import Batch, Settings\n"
         "print('runs', flush=True)\n"
         f"settings = Settings((), {tuple(QUICK[1::2])!r}, (), None, '.h5', {{'format': 'h5'}})\n"
         "print(Batch(Path('from'), Path('to'), settings).run(jobs=1).made)\n"

@@ -4,37 +4,47 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from adv2e import __version__
 from adv2e.background import default_threads
-from adv2e.batch import processes
-from adv2e.batch.exports import Export, write_lists
-from adv2e.batch.forecast import forecast
-from adv2e.batch.manifest import Manifest, check_alone, manifest_path, read_records
-from adv2e.batch.plan import (
+from adv2e.batches import processes
+from adv2e.batches.exports import Export, write_lists
+from adv2e.batches.forecast import forecast
+from adv2e.batches.manifest import Manifest, check_alone, manifest_path, read_records
+from adv2e.batches.plan import (
     Task,
     Wanted,
     outputs_in_the_way,
     outputs_outside,
+    parse_shard,
     plan,
     seed_of,
     shard_of,
 )
-from adv2e.batch.sequences import Sequence as Found
-from adv2e.batch.sequences import find_sequences
-from adv2e.batch.work import Engine, Job
-from adv2e.config import Family, load_family, to_dict
+from adv2e.batches.sequences import Sequence as Found
+from adv2e.batches.sequences import find_sequences
+from adv2e.batches.work import Engine, Job
+from adv2e.config import Family, Written, load_family, to_dict
 from adv2e.config.active_effects import user_sources
 from adv2e.config.user_effects import load_effects
 from adv2e.conversion.estimate import Estimate
-from adv2e.errors import Adv2eError, OutputError
+from adv2e.errors import Adv2eError, OutputError, UsageError
 from adv2e.files.names import shown
 from adv2e.files.states import digest_of_values, state_of
+from adv2e.formats.lookup import check_frames, to_write
 from adv2e.light.interpolation import network_of
+from adv2e.options import AnyFrames, BatchOptions, Clock, Part, declared, size_of, takes
+from adv2e.process import bars
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from adv2e.formats.registry import Format
 
 
 @dataclass(frozen=True)
@@ -43,7 +53,8 @@ class Settings:
 
     Attributes
     ----------
-    config_files, sets, effect_files : tuple of str
+    config : what :func:`adv2e.load_config` takes
+    sets, effect_files : tuple of str
     seed : int, optional
         From which those of the sequences come; default: that of the configuration.
     suffix : str
@@ -54,7 +65,7 @@ class Settings:
         What is made of the events.
     """
 
-    config_files: tuple[str, ...]
+    config: Written | Sequence[Written] | None
     sets: tuple[str, ...]
     effect_files: tuple[str, ...]
     seed: int | None
@@ -66,7 +77,7 @@ class Settings:
     def family(self) -> Family:
         """The configuration for each seed; ConfigError, UsageError if it is wrong."""
         effects = [effect for file in self.effect_files for effect in load_effects(file)]
-        return load_family(self.config_files, self.sets, self.seed, effects)
+        return load_family(self.config, self.sets, self.seed, effects)
 
     def wanted(self, dest: Path) -> Wanted:
         """Return the settings of the files, with their digest; ConfigError, UsageError if wrong."""
@@ -98,12 +109,15 @@ class Outcome:
         Made, not those that were kept.
     passed : int
         Files and folders that were passed over, of all shards.
+    told : tuple of str
+        Some of them, and why, a line each.
     """
 
     tasks: list[Task]
     failed: dict[str, str]
     events: int
     passed: int = 0
+    told: tuple[str, ...] = ()
 
     @property
     def made(self) -> int:
@@ -125,11 +139,18 @@ class Batch:
         Where sequences are, and where the same tree of events is made.
     settings : Settings
     layout : str
-        Which sequences count; see :mod:`adv2e.batch.sequences`.
+        Which sequences count; see :mod:`adv2e.batches.sequences`.
     shard : (int, int), optional
         (I, N): only the I-th of N parts of about the same size.
     overwrite : bool
         Make all anew, and replace files that others made.
+
+    Attributes
+    ----------
+    dest, manifest : Path
+        Folder of the events, and the file of records in it.
+    passed : list of str
+        Files and folders that were passed over, and why.
 
     Raises
     ------
@@ -147,8 +168,8 @@ class Batch:
         shard: tuple[int, int] | None = None,
         overwrite: bool = False,
     ) -> None:
-        self._dest, self._settings, self._overwrite = dest, settings, overwrite
-        self._shard = shard
+        self.dest, self._settings, self._overwrite = dest, settings, overwrite
+        self.manifest = manifest_path(dest, shard)
         self._wanted = settings.wanted(dest)
         found = find_sequences(source, layout, leave_out=dest, fps=settings.options.get("fps"))
         self._sequences, self.passed = found.sequences, found.told()
@@ -178,7 +199,7 @@ class Batch:
         OutputError
             A file that this batch did not make lies where one is to go, or a link leads out.
         """
-        records = read_records(self._dest)
+        records = read_records(self.dest)
         tasks = plan(
             self._sequences,
             self._states,
@@ -187,7 +208,7 @@ class Batch:
             overwrite=self._overwrite,
         )
         for path in outputs_outside(tasks, self._wanted):
-            raise OutputError(f"{shown(path)}: a link leads out of {shown(self._dest)}: remove it")
+            raise OutputError(f"{shown(path)}: a link leads out of {shown(self.dest)}: remove it")
         strange = outputs_in_the_way(tasks, records, self._wanted)
         if strange and not self._overwrite:
             raise OutputError(
@@ -238,7 +259,7 @@ class Batch:
         """
         failed: dict[str, str] = {}
         events = 0
-        with Manifest(manifest_path(self._dest, self._shard)) as manifest:
+        with Manifest(self.manifest) as manifest:
             check_alone(manifest.path)
             tasks = self.plan()
             begun(tasks)
@@ -257,8 +278,213 @@ class Batch:
                     failed[job.name] = wrong
                 ended(waiting[job.name], record)
             if self._wanted.export is not None and self._wanted.export.kind == "e2vid":
-                write_lists(self._dest, read_records(self._dest).values())
-        return Outcome(tasks, failed, events, self._passed)
+                write_lists(self.dest, read_records(self.dest).values())
+        return Outcome(tasks, failed, events, self._passed, tuple(self.passed))
+
+
+@takes(BatchOptions)
+def batch(
+    source: str | Path,
+    dest: str | Path,
+    config: Written | Sequence[Written] | None = None,
+    *,
+    sets: Sequence[str] = (),
+    seed: int | None = None,
+    effects: Sequence[str | Path] = (),
+    log: Callable[[str, int], None] = lambda text, level: None,
+    **options: Unpack[BatchOptions],
+) -> Outcome:
+    """Convert every sequence below a folder, and make the same tree below another.
+
+    It may be called again: it makes what is missing, and what has changed since in its source, its
+    settings or the version of adv2e.
+
+    Parameters
+    ----------
+    source, dest : str or Path
+        Folder of sequences, and folder of the events.
+    config : what :func:`adv2e.load_config` takes, optional
+    sets : sequence of str
+        Single keys, such as ``pixel.low_pass.cutoff_hz=100``.
+    seed : int, optional
+        Seed of the batch. Each sequence has one of its own, made of this and its name.
+    effects : sequence of path
+        Files of effects of your own.
+    log : callable
+        Takes lines for people, and how much is asked for who sees them: 0, or 1 for more.
+    **options
+        See :class:`adv2e.options.BatchOptions`.
+
+    Returns
+    -------
+    Outcome
+        Its `failed` says what went wrong with a sequence, by its name.
+
+    Raises
+    ------
+    Adv2eError
+        There is nothing to convert, settings are wrong, or files of others are in the way.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> import cv2
+    >>> import numpy as np
+    >>> from adv2e import batch
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> clips, events = (os.path.join(folder.name, name) for name in ("clips", "events"))
+    >>> os.makedirs(os.path.join(clips, "first"))
+    >>> for number in range(3):
+    ...     picture = np.full((24, 32), 40 + 60 * number, np.uint8)
+    ...     _ = cv2.imwrite(os.path.join(clips, "first", f"{number}.png"), picture)
+    >>> done = batch(clips, events, fps=100)
+    >>> (done.made, done.kept, done.failed, os.path.isfile(os.path.join(events, "first.h5")))
+    (1, 0, {}, True)
+    >>> batch(clips, events, fps=100).kept
+    1
+    >>> folder.cleanup()
+    """
+    work = open_batch(source, dest, config, sets=sets, seed=seed, effects=effects, **options)
+    with ExitStack() as stack:
+        told = _Told(work, options, log, stack)
+        return work.run(
+            jobs=options["jobs"],
+            threads=options["threads"],
+            engine=_engine(work, options, log),
+            begun=told.begun,
+            ended=told.ended,
+        )
+
+
+_RECORDED = ("fps", "rotate180", "track")
+"""Options of inputs that settings of a batch always hold."""
+
+
+@takes(BatchOptions)
+def open_batch(
+    source: str | Path,
+    dest: str | Path,
+    config: Written | Sequence[Written] | None,
+    *,
+    sets: Sequence[str],
+    seed: int | None,
+    effects: Sequence[str | Path],
+    **options: Unpack[BatchOptions],
+) -> Batch:
+    """Find the sequences of a batch; parameters and errors as :func:`batch`."""
+    for name in (str(source), str(dest)):
+        if "://" in name:
+            raise UsageError(
+                f"{name}: addresses are not read: mount it as a folder, or copy it (such as by"
+                " rclone)"
+            )
+    size = size_of(options)
+    if size is not None:
+        sets = (*sets, f"sensor.width={size.width}", f"sensor.height={size.height}")
+    format = to_write(Path("a"), options["format"])
+    export = _export(options, format)
+    if options["with_frames"]:
+        check_frames(format)
+    # what was made before an option came to be is up to date without it
+    usual = declared(AnyFrames, Part, Clock)
+    asked = {
+        name: value
+        for name, value in options.items()
+        if name in usual and name != "size"
+        if name in _RECORDED or value != usual[name].default
+    }
+    asked |= {
+        "format": options["format"],
+        "with_frames": options["with_frames"] or (export is not None and export.needs_frames),
+        "causes": options["causes"],
+    }
+    suffix = next(iter(format.suffixes))
+    files = tuple(map(str, effects))
+    settings = Settings(config, tuple(sets), files, seed, suffix, asked, export)
+    shard = None if options["shard"] is None else parse_shard(options["shard"])
+    return Batch(
+        Path(source),
+        Path(dest),
+        settings,
+        layout=options["layout"],
+        shard=shard,
+        overwrite=options["overwrite"],
+    )
+
+
+def _export(options: BatchOptions, format: Format) -> Export | None:
+    """Return the settings of --export, None without; UsageError if other options do not fit it."""
+    kind, window_us, bins = options["export"], options["window_us"], options["bins"]
+    if window_us is not None and kind not in ("voxel", "ev-segnet"):
+        raise UsageError("--window is for --export voxel and --export ev-segnet")
+    if bins is not None and kind != "voxel":
+        raise UsageError("--bins is for --export voxel")
+    if kind is None:
+        return None
+    export = Export(kind, window_us, bins or 5)
+    if export.needs_frames and "w" not in format.frames:
+        raise UsageError(
+            f"--export {kind} needs frames, and {format.what} holds events alone: leave out"
+            " --format"
+        )
+    return export
+
+
+def _engine(work: Batch, options: BatchOptions, log: Callable[[str, int], None]) -> Engine | None:
+    """Return the Dask cluster that converts; None: processes of this machine."""
+    scheduler, threads = options["scheduler"], options["threads"] or 1
+    if scheduler is None:
+        return None
+    from adv2e.batches.cluster import Cluster  # noqa: PLC0415 - dask is an extra
+
+    return Cluster(
+        scheduler,
+        work.manifest,
+        at_most=options["jobs"],
+        threads=threads,
+        log=lambda text: log(text, 0),
+    )
+
+
+_LARGE_SOURCE = 100_000_000
+"""Bytes of source from which on it is worth to look how much will come out."""
+
+
+class _Told:
+    """The bar over all sequences, and a line for each failure."""
+
+    def __init__(
+        self,
+        work: Batch,
+        options: BatchOptions,
+        log: Callable[[str, int], None],
+        stack: ExitStack,
+    ) -> None:
+        self._work, self._options, self._log, self._stack = work, options, log, stack
+        self._bar: Any = None
+
+    def begun(self, tasks: list[Task]) -> None:
+        self._log(reasons(tasks), 0)
+        total = sum(task.state.bytes for task in tasks if task.why)
+        if total > _LARGE_SOURCE:
+            coming = self._work.forecast(tasks, self._options["jobs"], self._options["threads"])
+            if coming is not None and coming.is_much(self._work.dest):
+                self._log(coming.text(self._work.dest), 0)
+        if self._options["progress"]:
+            self._bar = self._stack.enter_context(
+                bars.bar(total=total, unit="B", unit_scale=True, desc="batch")
+            )
+
+    def ended(self, task: Task, record: Mapping[str, Any]) -> None:
+        if self._bar is not None:
+            self._bar.update(task.state.bytes)
+        name = shown(task.sequence.name)
+        if wrong := error_of(record):
+            self._log(f"{name}: {wrong}", 0)
+            return
+        self._log(f"{name}: {record['events']:,} events", 1)
+        for note in [*record["notes"], *record.get("export", {}).get("notes", ())]:
+            self._log(f"{name}: {note}", 1)
 
 
 def _check_apart(wanted: Wanted, sequences: Sequence[Found]) -> None:

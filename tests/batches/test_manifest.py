@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adv2e.batch.manifest import Manifest, check_alone, manifest_path, read_records
+from adv2e.batches.manifest import Manifest, check_alone, manifest_path, read_records
 from adv2e.errors import DataError, OutputError
 
 

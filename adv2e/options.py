@@ -1,0 +1,872 @@
+"""Options of inputs, outputs and runs, each declared once for the command line and for Python.
+
+A group of options is a ``TypedDict`` whose annotations hold an :class:`Option` each.  ``adv2e.cli``
+makes Click's options of it.  A function takes the same options by name::
+
+    @takes(InputOptions)
+    def open_source(path, **options: Unpack[InputOptions]): ...
+
+:func:`takes` gives it the signature and the documentation that the declarations say, refuses names
+and values that are wrong, and hands it all options, with defaults for those that were left out.
+"""
+
+import difflib
+import functools
+import inspect
+import math
+import re
+import textwrap
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ForwardRef,
+    SupportsIndex,
+    TypedDict,
+    TypeVar,
+    get_args,
+)
+
+from adv2e.errors import UsageError
+from adv2e.geometry import Rectangle, Size, parse_rectangle, parse_size
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from fractions import Fraction
+    from pathlib import Path
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+Options = TypeVar("Options")
+
+UNITS = ("s", "ms", "us", "ns")
+"""Units of time, by name."""
+
+BAYER = ("RGGB", "BGGR", "GRBG", "GBRG")
+"""Mosaics: colours of the first two pixels of the first row, then of the second."""
+
+PIXEL_FORMATS = (
+    *("gray", "gray10le", "gray12le", "gray14le", "gray16le", "rgb24", "bgr24", "rgb48le"),
+)
+"""Raw video that is read, by FFmpeg's names."""
+
+SET_BACK = ("continue", "sort")
+"""Readings of events whose times go back."""
+
+
+def _seconds(value: float) -> float:
+    if not (value >= 0 and math.isfinite(value)):
+        raise ValueError(f"must be seconds from the first frame, got {value:g}")
+    return value
+
+
+def _count(value: int) -> int:
+    if not (isinstance(value, SupportsIndex) and value >= 1):
+        raise ValueError(f"must be a whole number from 1 on, got {value!r}")
+    return value
+
+
+_CHECKS: dict[str, Callable[[Any], Any]] = {
+    "size": parse_size,
+    "rectangle": parse_rectangle,
+    "seconds": _seconds,
+    "count": _count,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Option:
+    """Declaration of one option.
+
+    Attributes
+    ----------
+    help : str
+        Meaning, in the words of the command line; ``--size`` in it is ``size`` in Python.
+    default : object
+        False makes it a flag, () an option that may be repeated.
+    usual : str
+        Effect of leaving it out, if the default value does not tell.
+    kind : str
+        Type on the command line: text, path, rate, size, rectangle, seconds, positive, share,
+        time, or count.
+    choices : tuple of str
+        Values, if there are only few.
+    flags : tuple of str
+        Names on the command line, if there is not the one that Python has.
+    metavar : str
+        Value in the help of the command line.
+    most : int, optional
+        Largest value of a count.
+    completes : str
+        Names that a shell completes: of files, formats, or layouts.
+    """
+
+    help: str
+    usual: str = ""
+    default: Any = None
+    kind: str = "text"
+    choices: tuple[str, ...] = ()
+    flags: tuple[str, ...] = ()
+    metavar: str = ""
+    most: int | None = None
+    completes: str = ""
+
+    def flag_of(self, name: str) -> str:
+        """Return the name on the command line of the option that Python calls `name`."""
+        return self.flags[0] if self.flags else "--" + name.replace("_", "-")
+
+    def checked(self, name: str, value: Any) -> Any:
+        """Return a value as the code takes it.
+
+        Raises
+        ------
+        UsageError
+            It is impossible.
+        """
+        if value is None or self.default == ():
+            return value
+        try:
+            if self.choices and value not in self.choices:
+                *first, last = self.choices
+                raise ValueError(f"must be {', '.join(first)} or {last}, got {value!r}")
+            return _CHECKS[self.kind](value) if self.kind in _CHECKS else value
+        except (ValueError, TypeError) as error:
+            raise UsageError(f"{self.flag_of(name)}: {error}") from None
+
+
+class AnyInput(TypedDict, total=False):
+    """Options of any input, be it frames or events."""
+
+    time_unit: Annotated[
+        "str | None",
+        Option(
+            help="Unit of the times in lists and event files.",
+            usual="what the file says; else a guess, and a line that tells it",
+            choices=UNITS,
+        ),
+    ]
+    rotate180: Annotated[
+        bool,
+        Option(
+            help="Turn frames and events by 180 degrees, first of all: the camera was mounted"
+            " upside down, as for DDD17 and DDD20.",
+            default=False,
+        ),
+    ]
+    track: Annotated[
+        "str | int | None",
+        Option(
+            help="Which one to read of several video tracks, streams or topics: its number from 0,"
+            " or its name.",
+            usual="the usual one of them, and a line that tells all",
+            flags=("--track", "--stream", "--topic"),
+            metavar="N|NAME",
+        ),
+    ]
+    size: Annotated[
+        "str | tuple[int, int] | None",
+        Option(
+            help="Size of the sensor, such as 346x260. Frames are scaled and cut to it; sensor.fit"
+            " says how. Of raw video it is the size of the frames, too.",
+            usual="as the frames are, or as the file of events says",
+            kind="size",
+            metavar="WxH",
+        ),
+    ]
+
+
+class EventOrder(TypedDict, total=False):
+    """Option of events out of order."""
+
+    set_back: Annotated[
+        "str | None",
+        Option(
+            help="Where times of events go back by more than 0.1 s. continue: from the time"
+            " before, as where a clock was reset. sort: by time.",
+            usual="an error",
+            choices=SET_BACK,
+        ),
+    ]
+
+
+class EventInput(AnyInput, EventOrder, total=False):
+    """Options of the reading of events."""
+
+    crop_events: Annotated[
+        bool,
+        Option(
+            help="Leave out events outside the sensor, however many.",
+            usual="more than 1 % are an error",
+            default=False,
+        ),
+    ]
+
+
+class AnyFrames(AnyInput, total=False):
+    """Options of the reading of frames, of one input or of many."""
+
+    fps: Annotated[
+        "float | Fraction | str | None",
+        Option(
+            help="Take the frames at F a second, such as 240 or 30000/1001, whatever the input"
+            " says.",
+            kind="rate",
+            metavar="F",
+        ),
+    ]
+    allow_damaged: Annotated[
+        bool,
+        Option(
+            help="Take what can be decoded of a damaged video, and say what is missing.",
+            default=False,
+        ),
+    ]
+    bayer: Annotated[
+        "str | None",
+        Option(
+            help="Frames are raw mosaics, with these colours in the first two rows: make them"
+            " colour.",
+            choices=BAYER,
+        ),
+    ]
+
+
+class FrameInput(AnyFrames, total=False):
+    """Options of the reading of the frames of one input."""
+
+    timestamps: Annotated[
+        "str | Path | None",
+        Option(
+            help="Read the times of the frames from FILE, one a line.", kind="path", metavar="FILE"
+        ),
+    ]
+    pixel_format: Annotated[
+        "str | None",
+        Option(
+            help="Raw video comes through standard input (the input is -), in frames of the --size"
+            " given.",
+            choices=PIXEL_FORMATS,
+        ),
+    ]
+
+
+StopS = Annotated[
+    "float | None",
+    Option(
+        help="Stop S seconds after the first frame, or event.",
+        flags=("--stop",),
+        kind="seconds",
+        metavar="S",
+    ),
+]
+
+
+class Part(TypedDict, total=False):
+    """Options that choose a part of an input."""
+
+    start_s: Annotated[
+        "float | None",
+        Option(
+            help="Begin S seconds after the first frame, or event.",
+            flags=("--start",),
+            kind="seconds",
+            metavar="S",
+        ),
+    ]
+    stop_s: StopS
+    crop: Annotated[
+        "str | tuple[int, int, int, int] | None",
+        Option(
+            help="Take a part of each frame or sensor only, before anything else: first column,"
+            " first row, columns, rows.",
+            kind="rectangle",
+            metavar="X,Y,W,H",
+        ),
+    ]
+
+
+class Clock(TypedDict, total=False):
+    """Option of the clock of what is made."""
+
+    t0: Annotated[
+        str,
+        Option(
+            help="Where times begin. zero: at the first frame converted. keep, auto: as on the"
+            " input's own clock; if it has none, at the input's first frame.",
+            default="auto",
+            choices=("auto", "zero", "keep"),
+        ),
+    ]
+
+
+class SourceOptions(FrameInput, Part, Clock, total=False):
+    """Options of an input with frames that are simulated."""
+
+    motion: Annotated[
+        "str | None",
+        Option(
+            help="The input is one picture, before which the sensor moves: in three saccades, as"
+            " N-MNIST was recorded, as a hand shakes, or to the right.",
+            choices=("saccade", "shake", "pan"),
+        ),
+    ]
+    extent_px: Annotated[
+        "float | None",
+        Option(
+            help="How far it moves, in pixels of the sensor.",
+            usual="6, 8 or 32",
+            flags=("--extent",),
+            kind="positive",
+            metavar="PX",
+        ),
+    ]
+    duration_s: Annotated[
+        "float | None",
+        Option(
+            help="How long that takes, in seconds.",
+            usual="0.3, 1 or 1",
+            flags=("--duration",),
+            kind="positive",
+            metavar="S",
+        ),
+    ]
+
+
+Overwrite = Annotated[bool, Option(help="Replace an output that exists.", default=False)]
+
+
+class Content(TypedDict, total=False):
+    """Options of what a file of events holds beside them."""
+
+    with_frames: Annotated[
+        bool,
+        Option(
+            help="Store the frames, too, in an HDF5 output. DAVIS240C outputs always hold them.",
+            default=False,
+        ),
+    ]
+    causes: Annotated[
+        bool,
+        Option(
+            help="Also store what made each event: the light, leak or a kind of noise. HDF5 holds"
+            " it as events/causes, .npz and .csv as a column; beside other formats it is"
+            " OUT.causes.txt.",
+            default=False,
+        ),
+    ]
+
+
+class OutputOptions(Content, total=False):
+    """Options of a file of events that is written."""
+
+    format: Annotated[
+        "str | None",
+        Option(
+            help="Write this format, whatever the suffix.",
+            metavar="NAME",
+            completes="formats",
+        ),
+    ]
+    layout: Annotated[
+        "str | None",
+        Option(help="Layout of an HDF5 output.", metavar="NAME", completes="layouts"),
+    ]
+    overwrite: Overwrite
+
+
+class SimulatedOutput(OutputOptions, total=False):
+    """Options of the output of a simulation."""
+
+    preview: Annotated[
+        "str | Path | None",
+        Option(
+            help="Also draw the frames beside the events, as 'adv2e render' does: a film (.mp4,"
+            " .webm, .gif, .avi) or a sheet of pictures (.png).",
+            metavar="FILE",
+            completes="files",
+        ),
+    ]
+
+
+Progress = Annotated[bool, Option(help="Show a progress bar on stderr.", default=False)]
+
+
+class Run(TypedDict, total=False):
+    """Options of any work."""
+
+    threads: Annotated[
+        "int | None",
+        Option(
+            help="Compute with N threads. The result is the same for any N.",
+            usual="all cores that this process may use",
+            kind="count",
+            metavar="N",
+        ),
+    ]
+    progress: Progress
+
+
+class CopyOptions(EventInput, Part, Clock, OutputOptions, Run, total=False):
+    """Options of the writing of events in another format."""
+
+
+class InfoOptions(FrameInput, EventOrder, total=False):
+    """Options of the description of an input."""
+
+
+class ConvertOptions(SourceOptions, EventInput, SimulatedOutput, Run, total=False):
+    """Options of a conversion."""
+
+    take: Annotated[
+        "str | None",
+        Option(
+            help="What to take of an input that holds both: simulate its frames, or write its"
+            " events in another format.",
+            usual="the frames of cameras' recordings; the events of other files",
+            flags=("--from",),
+            choices=("frames", "events"),
+        ),
+    ]
+
+
+class DiagnoseOptions(EventInput, Part, Run, total=False):
+    """Options of a diagnosis."""
+
+    light: Annotated[
+        "str | Path | None",
+        Option(
+            help="What the light was, in the place of frames: a table with the columns time_s and"
+            " light_dn (255 is white).",
+            metavar="TABLE",
+            completes="files",
+        ),
+    ]
+    without: Annotated[
+        "Sequence[str]",
+        Option(
+            help="Leave an effect out of the library.",
+            default=(),
+            metavar="EFFECT",
+            completes="library",
+        ),
+    ]
+    fit_thresholds: Annotated[
+        bool,
+        Option(
+            help="The contrast thresholds are not known: fit them first, to the totals of ON and"
+            " OFF.",
+            default=False,
+        ),
+    ]
+    overwrite: Overwrite
+
+
+class FilmOptions(TypedDict, total=False):
+    """Options of films and sheets of pictures."""
+
+    fps: Annotated[
+        float,
+        Option(help="Pictures a second of a film.", default=30.0, kind="positive", metavar="F"),
+    ]
+    speed: Annotated[
+        float,
+        Option(
+            help="Speed of a film: 1 is real time, 0.1 is ten times slower.",
+            default=1.0,
+            kind="positive",
+            metavar="X",
+        ),
+    ]
+    count: Annotated[
+        int,
+        Option(
+            help="Show N instants on a sheet, about evenly spaced, if none is named.",
+            default=6,
+            kind="count",
+            most=100,
+            metavar="N",
+        ),
+    ]
+    scale: Annotated[
+        "int | None",
+        Option(
+            help="Draw each pixel N times as wide and high.",
+            usual="panels about 640 pixels wide",
+            kind="count",
+            most=32,
+            metavar="N",
+        ),
+    ]
+    max_pictures: Annotated[
+        int,
+        Option(
+            help="Most pictures of a film: one wrong time would make far too many.",
+            default=36_000,
+            kind="count",
+            metavar="N",
+        ),
+    ]
+    overwrite: Overwrite
+
+
+class RenderedPart(FilmOptions, total=False):
+    """Options of the film or sheet of a whole recording."""
+
+    start_s: Annotated[
+        float,
+        Option(
+            help="Begin S seconds after the first frame, or event.",
+            default=0.0,
+            flags=("--start",),
+            kind="seconds",
+            metavar="S",
+        ),
+    ]
+    stop_s: StopS
+    at_s: Annotated[
+        "Sequence[float]",
+        Option(
+            help="Show this instant on a sheet.",
+            default=(),
+            flags=("--at",),
+            kind="seconds",
+            metavar="S",
+        ),
+    ]
+    progress: Progress
+
+
+class RenderOptions(RenderedPart, EventInput, total=False):
+    """Options of pictures and films of events."""
+
+    style: Annotated[
+        str,
+        Option(
+            help="white, black: coloured events on that ground. grey: the net count of events, as"
+            " v2e draws it. surface: colours that fade with age.",
+            default="white",
+            choices=("white", "black", "grey", "surface"),
+        ),
+    ]
+    on_color: Annotated[
+        str,
+        Option(help="Colour of ON events: a name or #rrggbb.", default="red", metavar="COLOR"),
+    ]
+    off_color: Annotated[
+        str,
+        Option(help="Colour of OFF events: a name or #rrggbb.", default="blue", metavar="COLOR"),
+    ]
+    window_ms: Annotated[
+        "float | None",
+        Option(
+            help="A picture shows the events of the last MS milliseconds.",
+            usual="in a film, those since the picture before; on a sheet 20",
+            flags=("--window",),
+            kind="positive",
+            metavar="MS",
+        ),
+    ]
+
+
+WindowUs = Annotated[
+    "int | None",
+    Option(
+        help="Cut the events into windows of TIME, such as 33ms. For ev-segnet: the time before"
+        " each image.",
+        usual="ev-segnet: 50ms",
+        flags=("--window",),
+        kind="time",
+        metavar="TIME",
+    ),
+]
+
+
+class VoxelOptions(TypedDict, total=False):
+    """Options of an export of voxel grids."""
+
+    window_us: WindowUs
+    count: Annotated[
+        "int | None", Option(help="Cut into windows of N events.", kind="count", metavar="N")
+    ]
+    at: Annotated["str | None", Option(help="Cut where the images are.", choices=("images",))]
+    most_empty: Annotated[
+        int,
+        Option(
+            help="Most windows of TIME in a row without an event: one wrong time would make far too"
+            " many.",
+            default=1000,
+            flags=("--max-empty",),
+            kind="count",
+            metavar="N",
+        ),
+    ]
+    bins: Annotated[
+        int,
+        Option(
+            help="Temporal bins of a voxel grid.",
+            default=5,
+            kind="count",
+            most=10_000,
+            metavar="N",
+        ),
+    ]
+    normalise: Annotated[
+        str,
+        Option(
+            help="e2vid: mean 0 and deviation 1 over the cells that are not zero."
+            " event_cnn_minimal: its RobustNorm, 0th to 95th percentile.",
+            default="none",
+            choices=("none", "e2vid", "event_cnn_minimal"),
+        ),
+    ]
+    polarity: Annotated[
+        str,
+        Option(
+            help="signed: ON counts +1, OFF -1. split: the bins of ON, then those of OFF.",
+            default="signed",
+            choices=("signed", "split"),
+        ),
+    ]
+    span: Annotated[
+        str,
+        Option(
+            help="The bins reach from the first to the last event, as in E2VID, or over the whole"
+            " window.",
+            default="events",
+            choices=("events", "window"),
+        ),
+    ]
+
+
+class SegmentationOptions(TypedDict, total=False):
+    """Options of an export for Ev-SegNet."""
+
+    window_us: WindowUs
+    split: Annotated[
+        str,
+        Option(
+            help="Part of the data set of Ev-SegNet.",
+            default="train",
+            choices=("train", "test", "other"),
+        ),
+    ]
+    rows: Annotated[
+        "int | None",
+        Option(
+            help="Keep the upper N rows.",
+            usual="200 of 346x260 pixels, as DDD17 was cut; else all",
+            kind="count",
+            metavar="N",
+        ),
+    ]
+    counts: Annotated[
+        str,
+        Option(
+            help="Counts of Ev-SegNet: scaled to -1...1, or as counted.",
+            default="scaled",
+            choices=("scaled", "raw"),
+        ),
+    ]
+
+
+class TrainingOptions(TypedDict, total=False):
+    """Options of an export of a training set for E2VID."""
+
+    valid: Annotated[
+        float,
+        Option(
+            help="Share that is for validation: of the recordings, or of the images if there is"
+            " one.",
+            default=0.2,
+            kind="share",
+            metavar="SHARE",
+        ),
+    ]
+
+
+EXPORTS = {"voxel": VoxelOptions, "ev-segnet": SegmentationOptions, "e2vid": TrainingOptions}
+"""Options of each kind of export, by its name."""
+
+
+class ExportOptions(EventInput, Run, total=False):
+    """Options of any export; those of its kind are in :data:`EXPORTS`."""
+
+    overwrite: Overwrite
+
+
+LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "images", "videos")
+"""Trees of sequences that a batch knows."""
+
+
+class BatchOptions(AnyFrames, Part, Clock, Content, Run, total=False):
+    """Options of a batch."""
+
+    layout: Annotated[str, Option(help="Which sequences count.", default="auto", choices=LAYOUTS)]
+    format: Annotated[
+        str,
+        Option(help="Format of the files.", default="h5", metavar="NAME", completes="formats"),
+    ]
+    export: Annotated[
+        "str | None",
+        Option(
+            help="Make a training set of the events of each sequence, too, as 'adv2e export' does."
+            " Stores the frames where it needs them.",
+            choices=tuple(EXPORTS),
+        ),
+    ]
+    window_us: Annotated[
+        "int | None",
+        Option(
+            help="Of --export voxel: windows of TIME, such as 33ms. Of --export ev-segnet: the time"
+            " before each image.",
+            usual="from image to image; ev-segnet: 50ms",
+            flags=("--window",),
+            kind="time",
+            metavar="TIME",
+        ),
+    ]
+    bins: Annotated[
+        "int | None",
+        Option(
+            help="Of --export voxel: temporal bins of a grid.",
+            usual="5",
+            kind="count",
+            most=10_000,
+            metavar="N",
+        ),
+    ]
+    jobs: Annotated[
+        "int | None",
+        Option(
+            help="Convert N sequences at a time.",
+            usual="one for each thread",
+            kind="count",
+            metavar="N",
+        ),
+    ]
+    shard: Annotated[
+        "str | None",
+        Option(help="Do only the I-th of N parts of about the same size.", metavar="I/N"),
+    ]
+    scheduler: Annotated[
+        "str | None",
+        Option(
+            help="Convert on the workers of this Dask scheduler, such as tcp://node1:8786 or the"
+            " file that it wrote. --jobs N bounds how many at a time; each has --threads, 1 by"
+            " default.",
+            metavar="ADDRESS",
+        ),
+    ]
+    overwrite: Overwrite
+
+
+def declared(*groups: Any) -> dict[str, Option]:
+    """Return the options of groups, by name, in the order of their declaration."""
+    return {name: hint.__metadata__[0] for name, hint in _hints(groups).items()}
+
+
+def _hints(groups: Iterable[Any]) -> dict[str, Any]:
+    return {name: hint for group in groups for name, hint in group.__annotations__.items()}
+
+
+def size_of(options: AnyInput) -> Size | None:
+    """Return the size of the sensor that options say, if they do."""
+    return None if (size := options["size"]) is None else parse_size(size)
+
+
+def crop_of(options: Part) -> Rectangle | None:
+    """Return the part of the sensor that options say, if they do."""
+    return None if (crop := options["crop"]) is None else parse_rectangle(crop)
+
+
+def chosen(group: type[Options], options: Mapping[str, Any]) -> Options:
+    """Return those of the options that belong to a group."""
+    known = declared(group)
+    found: Any = {name: value for name, value in options.items() if name in known}
+    return found  # type: ignore[no-any-return]
+
+
+def check_together(options: Mapping[str, Any]) -> None:
+    """Raise UsageError if options contradict one another."""
+    start_s, stop_s = options.get("start_s"), options.get("stop_s")
+    if start_s is not None and stop_s is not None and stop_s <= start_s:
+        raise UsageError(f"--stop {stop_s:g} must be after --start {start_s:g}")
+    of_frames = "allow_damaged" in options  # and not of a film that is made
+    if of_frames and options["fps"] is not None:
+        if options.get("timestamps") is not None:
+            raise UsageError("--fps and --timestamps both give the times of the frames: keep one")
+        if options.get("time_unit") is not None:
+            raise UsageError("--time-unit is for lists of times, which --fps replaces: keep one")
+    sizes = options.get("extent_px"), options.get("duration_s")
+    if options.get("motion") is None and sizes != (None, None):
+        raise UsageError("--extent and --duration are of the path that --motion makes")
+
+
+def takes(*groups: Any) -> Callable[[Function], Function]:
+    """Return a decorator of functions that take the options of groups as ``**options``."""
+    known = declared(*groups)
+    defaults = {name: option.default for name, option in known.items()}
+
+    def decorate(function: Function) -> Function:
+        signature = inspect.signature(function)
+        own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
+        named = {one.name for one in own}
+
+        @functools.wraps(function)
+        def call(*arguments: Any, **given: Any) -> Any:
+            for name, value in given.items():
+                if name in known:
+                    given[name] = known[name].checked(name, value)
+                elif name not in named:
+                    near = difflib.get_close_matches(name, known, 1)
+                    hint = f"; did you mean {near[0]!r}?" if near else ""
+                    raise TypeError(
+                        f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}"
+                    )
+            given = {**defaults, **given}
+            check_together(given)
+            return function(*arguments, **given)
+
+        added = [
+            inspect.Parameter(
+                name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=defaults[name],
+                annotation=_annotation(hint),
+            )
+            for name, hint in _hints(groups).items()
+        ]
+        made: Any = call
+        made.__signature__ = signature.replace(parameters=[*own, *added])
+        made.__doc__ = _documented(function.__doc__ or "", groups)
+        return made  # type: ignore[no-any-return]
+
+    return decorate
+
+
+def _annotation(hint: Any) -> str:
+    """Return the type of an option as it is written."""
+    (kind,) = get_args(hint)[:1]
+    return kind.__forward_arg__ if isinstance(kind, ForwardRef) else kind.__name__
+
+
+def _documented(text: str, groups: Iterable[Any]) -> str:
+    """Return a docstring with the options in the place of its entry ``**options``."""
+    from adv2e.in_python import in_python  # noqa: PLC0415
+
+    lines = []
+    for name, hint in _hints(groups).items():
+        option: Option = hint.__metadata__[0]
+        values = ", ".join(map(repr, option.choices))
+        kind = f"{{{values}}}" if values else _annotation(hint).removesuffix(" | None")
+        optional = ", optional" if option.default is None else ""
+        usual = f"  Default: {option.usual}." if option.usual else ""
+        lines += [f"    {name} : {kind}{optional}", *_wrapped(in_python(option.help) + usual)]
+    return _ENTRY.sub(lambda found: "\n".join(lines) + "\n", text, count=1)
+
+
+_wrapped = textwrap.TextWrapper(100, initial_indent=" " * 8, subsequent_indent=" " * 8).wrap
+
+
+_ENTRY = re.compile(r"^    \*\*options\b.*\n(?:        .*\n)*", re.MULTILINE)
