@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 _LARGEST_US = 2**62 // 1000  # adv2e.ticks.LARGEST_NS, without NumPy
@@ -82,7 +83,7 @@ class Format:
     def load(self, what: str) -> Any:
         """Return the object that `what`, `reader` or `writer`, stands for."""
         module, _, name = what.partition(":")
-        return getattr(importlib.import_module(f"adv2e.formats.{module}"), name)
+        return attrgetter(name)(importlib.import_module(f"adv2e.formats.{module}"))
 
 
 _HDF5 = (".h5", ".hdf5")
@@ -92,8 +93,8 @@ FORMATS = (
         name="monash",
         what="HDF5 of event_utils and event_cnn_minimal",
         suffixes=_HDF5,
-        reader="monash.reader:open_monash",
-        writer="monash.writer:MonashWriter",
+        reader="hdf5_layouts:MONASH.open",
+        writer="hdf5_writer:MonashWriter",
         datasets=("events/ts", "events/xs", "events/ys", "events/ps"),
         frames="rw",
         causes="causes:in_hdf5",
@@ -102,8 +103,8 @@ FORMATS = (
         name="dsec",
         what="HDF5 of DSEC",
         suffixes=_HDF5,
-        reader="dsec:open_dsec",
-        writer="dsec:DsecWriter",
+        reader="hdf5_layouts:DSEC.open",
+        writer="hdf5_writer:DsecWriter",
         datasets=("events/t", "events/x", "events/y", "events/p"),
         causes="causes:in_hdf5",
     ),
@@ -111,8 +112,8 @@ FORMATS = (
         name="v2e",
         what="HDF5 of v2e",
         suffixes=_HDF5,
-        reader="v2e:open_v2e",
-        writer="v2e:V2eWriter",
+        reader="hdf5_layouts:V2E.open",
+        writer="hdf5_writer:V2eWriter",
         datasets=("events",),
         frames="rw",
         first_us=0,
@@ -122,8 +123,8 @@ FORMATS = (
         name="mvsec",
         what="HDF5 of MVSEC",
         suffixes=_HDF5,
-        reader="mvsec:open_mvsec",
-        writer="mvsec:MvsecWriter",
+        reader="hdf5_layouts:MVSEC.open",
+        writer="hdf5_writer:MvsecWriter",
         datasets=("davis/*/events",),
         frames="rw",
         is_camera=True,
@@ -132,8 +133,8 @@ FORMATS = (
         name="m3ed",
         what="HDF5 of M3ED",
         suffixes=_HDF5,
-        reader="m3ed:open_m3ed",
-        writer="m3ed:M3edWriter",
+        reader="hdf5_layouts:M3ED.open",
+        writer="hdf5_writer:M3edWriter",
         datasets=("prophesee/*/t", "prophesee/*/x", "prophesee/*/y", "prophesee/*/p"),
         first_us=0,
         last_us=(1 << 40) - 1,
@@ -142,7 +143,7 @@ FORMATS = (
         name="prophesee",
         what="HDF5 of Prophesee's tools",
         suffixes=_HDF5,
-        reader="prophesee:open_prophesee",
+        reader="hdf5_layouts:PROPHESEE.open",
         datasets=("CD/events",),
     ),
     Format(

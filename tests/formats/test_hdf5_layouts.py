@@ -169,7 +169,7 @@ def test_v2e_as_its_readers_have_it(tmp_path):
 
 @pytest.mark.parametrize("t_ns", [-1000, (1 << 32) * 1000])
 def test_v2e_refuses_frames_whose_times_it_cannot_hold(tmp_path, t_ns):
-    with pytest.raises(OutputError, match=r"a\.h5: a frame at .* does not fit the layout v2e"):
+    with pytest.raises(OutputError, match=r"a\.h5: a frame at .* does not fit HDF5 of v2e"):
         write(tmp_path / "a.h5", "v2e", [(t_ns, grey(0)), many(9)])
     assert list(tmp_path.iterdir()) == []
 
