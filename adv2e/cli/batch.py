@@ -12,7 +12,7 @@ import click
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
 from adv2e.files.names import shown
-from adv2e.formats import lookup
+from adv2e.formats import registry
 from adv2e.process import bars
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ _LARGE_SOURCE = 100_000_000
     default="h5",
     show_default=True,
     shell_complete=completion.formats,
-    help=f"Format of the files: {', '.join(lookup.names())}.",
+    help=f"Format of the files: {', '.join(registry.names())}.",
 )
 @click.option("--fps", metavar="F", callback=options.rate, help="Take all frames at F a second.")
 @click.option("--size", type=options.SIZE, metavar="WxH", help="Size of the sensor.")
@@ -167,10 +167,10 @@ def command(
     options.check_sets(sets, seed, size)
     if size is not None:
         sets = (*sets, f"sensor.width={size[0]}", f"sensor.height={size[1]}")
-    written = lookup.to_write(Path("a"), format)
+    written = registry.to_write(Path("a"), format)
     export = _export(kind, window_us, bins, written)
     if with_frames:
-        lookup.check_frames(written)
+        registry.check_frames(written)
     with_frames = with_frames or (export is not None and export.needs_frames)
     given |= {"format": format, "with_frames": with_frames}
     suffix = next(iter(written.suffixes))

@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
 from adv2e.cli.options import POSITIVE, SECONDS
-from adv2e.formats import lookup
+from adv2e.formats import registry
 
 if TYPE_CHECKING:
     from adv2e.cli.options import Log
@@ -81,14 +81,14 @@ if TYPE_CHECKING:
     "--format",
     metavar="NAME",
     shell_complete=completion.formats,
-    help=f"Write this format, whatever the suffix: {', '.join(lookup.names())}.",
+    help=f"Write this format, whatever the suffix: {', '.join(registry.names())}.",
 )
 @click.option(
     "--layout",
     metavar="NAME",
     shell_complete=completion.layouts,
-    help=f"Layout of an HDF5 output: {', '.join(lookup.layouts())}."
-    f"  [default: {lookup.layouts()[0]}]",
+    help=f"Layout of an HDF5 output: {', '.join(registry.layouts())}."
+    f"  [default: {registry.layouts()[0]}]",
 )
 @click.option(
     "--with-frames",
@@ -248,7 +248,7 @@ def _takes_events(source: str, choice: str | None, track: str | None) -> bool:
     DataError
         Events are copied, but options of a simulation are given.
     """
-    if choice is None and not lookup.may_hold_events(Path(source)):
+    if choice is None and not registry.may_hold_events(Path(source)):
         return False
     from adv2e.errors import DataError
     from adv2e.formats.frames import takes_events

@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
@@ -19,7 +19,9 @@ from adv2e.events import Events
 from adv2e.files.names import beside
 from adv2e.files.staging import Staging, writing
 from adv2e.formats import causes
-from adv2e.formats.registry import Format
+
+if TYPE_CHECKING:
+    from adv2e.formats.registry import Format
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,9 +7,8 @@ import pytest
 from adv2e.errors import DataError, OutputError
 from adv2e.events import make_events, sort_events
 from adv2e.formats.hdf5_writer import CHUNK
-from adv2e.formats.lookup import layouts
 from adv2e.formats.reading import read_events
-from adv2e.formats.registry import FORMATS
+from adv2e.formats.registry import FORMATS, layouts
 from adv2e.formats.writing import open_sink
 
 EPOCH_US = 1_468_941_032_229_165
