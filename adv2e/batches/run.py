@@ -36,7 +36,7 @@ from adv2e.conversion.estimate import Estimate
 from adv2e.errors import Adv2eError, OutputError, UsageError
 from adv2e.files.names import shown
 from adv2e.files.states import digest_of_values, state_of
-from adv2e.formats.lookup import check_frames, to_write
+from adv2e.formats.registry import check_frames, to_write
 from adv2e.light.interpolation import network_of
 from adv2e.options import AnyFrames, BatchOptions, Clock, Part, declared, size_of, takes
 from adv2e.process import bars

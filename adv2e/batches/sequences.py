@@ -30,7 +30,7 @@ from pathlib import Path, PurePosixPath
 
 from adv2e.errors import DataError
 from adv2e.files.zips import Members
-from adv2e.formats.lookup import format_of, may_hold_events
+from adv2e.formats.registry import format_of, may_hold_events
 from adv2e.sources import VIDEO_SUFFIXES, open_source
 from adv2e.sources.davis240c import is_recording
 from adv2e.sources.gopro import find_sequence

@@ -13,7 +13,7 @@ from adv2e.config import Config, from_dict
 from adv2e.config.user_effects import load_effects
 from adv2e.errors import Adv2eError, is_for_users
 from adv2e.files.states import State, digest_of
-from adv2e.formats.lookup import to_write
+from adv2e.formats.registry import to_write
 from adv2e.process.machine import machine_complaint
 
 

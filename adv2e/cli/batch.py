@@ -9,7 +9,7 @@ import click
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
 from adv2e.files.names import shown
-from adv2e.formats import lookup
+from adv2e.formats import registry
 from adv2e.options import BatchOptions, size_of
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ _UNKNOWN = (
     help="Seed of the batch. Each sequence has one of its own, made of this and its name.",
 )
 @options.effect_option
-@options.declared_options(BatchOptions, help={"format": f"One of: {', '.join(lookup.names())}."})
+@options.declared_options(BatchOptions, help={"format": f"One of: {', '.join(registry.names())}."})
 @click.option("--dry-run", is_flag=True, help="Show what would be done, and write nothing.")
 @click.option("--overwrite", is_flag=True, help="Make all anew, and replace files of others.")
 @options.reporting_options

@@ -54,13 +54,13 @@ def library(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offe
 
 def formats(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
     """Offer the formats that can be written."""
-    from adv2e.formats.lookup import names
+    from adv2e.formats.registry import names
 
     return starting(names(), incomplete)
 
 
 def layouts(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
     """Offer the layouts of HDF5 files."""
-    from adv2e.formats import lookup
+    from adv2e.formats import registry
 
-    return starting(lookup.layouts(), incomplete)
+    return starting(registry.layouts(), incomplete)

@@ -11,7 +11,7 @@ import click
 
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
-from adv2e.formats import lookup
+from adv2e.formats import registry
 from adv2e.options import ConvertOptions
 
 if TYPE_CHECKING:
@@ -31,8 +31,8 @@ _ENDED = "capture ended: what came is converted; a second Ctrl-C stops at once a
 @options.declared_options(
     ConvertOptions,
     help={
-        "format": f"One of: {', '.join(lookup.names())}.",
-        "layout": f"One of: {', '.join(lookup.layouts())}.  [default: {lookup.layouts()[0]}]",
+        "format": f"One of: {', '.join(registry.names())}.",
+        "layout": f"One of: {', '.join(registry.layouts())}.  [default: {registry.layouts()[0]}]",
     },
 )
 def command(

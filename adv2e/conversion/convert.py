@@ -185,7 +185,7 @@ def _takes_events(source: str, options: ConvertOptions, configured: str) -> bool
     DataError
         Events are copied, but options of a simulation are given.
     """
-    from adv2e.formats.lookup import may_hold_events  # noqa: PLC0415 - as above
+    from adv2e.formats.registry import may_hold_events  # noqa: PLC0415 - as above
 
     if options["take"] is None and not may_hold_events(Path(source)):
         return False

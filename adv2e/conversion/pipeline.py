@@ -31,7 +31,7 @@ from adv2e.events import Events
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging
 from adv2e.formats import compression
-from adv2e.formats.lookup import check_frames, to_write
+from adv2e.formats.registry import check_frames, to_write
 from adv2e.formats.sink import Sink
 from adv2e.formats.writing import open_sink
 from adv2e.geometry import Size

@@ -29,8 +29,8 @@ from adv2e.files.staging import Staging
 from adv2e.formats import compression
 from adv2e.formats.assembly import events_in_order, inside
 from adv2e.formats.event_file import EventFile, Progress
-from adv2e.formats.lookup import check_frames, to_write
 from adv2e.formats.reading import open_events
+from adv2e.formats.registry import check_frames, to_write
 from adv2e.formats.sink import Sink
 from adv2e.formats.writing import open_sink
 from adv2e.geometry import Rectangle

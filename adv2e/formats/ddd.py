@@ -52,9 +52,9 @@ from adv2e.errors import DataError
 from adv2e.formats import hdf5
 from adv2e.formats.clock import CONTINUE, Clock
 from adv2e.formats.event_file import Columns, EventFile, Facts
-from adv2e.formats.tables import Table, open_table
+from adv2e.formats.hdf5_layouts import Layout
 from adv2e.sources.frame import Pixels, Shot
-from adv2e.ticks import US, S
+from adv2e.ticks import S
 
 _SPECIAL, _POLARITY, _FRAME = range(3)
 
@@ -66,6 +66,16 @@ _WRAPS = range(1 << 21)
 _ROWS = 64
 """Rows read at once, of which each may be a frame."""
 _SIZE = (346, 260)
+
+_EXPORTED = Layout(
+    name="ddd20",
+    events="event",
+    order="txyp",
+    frames="frame",
+    stamps="frame_ts",
+    stamps_ns=S,
+)
+"""Layout of what is exported."""
 
 _UPSIDE_DOWN = (
     "the cameras of DDD17 and DDD20 were mounted upside down: --rotate180 turns frames and events"
@@ -108,7 +118,7 @@ def open_ddd(path: Path, facts: Facts) -> EventFile:
 
 def open_exported(path: Path, facts: Facts) -> EventFile:
     """Open an exported recording."""
-    file = open_table(path, facts, "ddd20", Table("event", "txyp", "frame", "frame_ts"), US, S)
+    file = _EXPORTED.open(path, facts)
     facts.state(_SIZE, "DDD20")
     _tell_upside_down(facts)
     return file

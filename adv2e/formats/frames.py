@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from adv2e.errors import DataError, UsageError
 from adv2e.files.zips import Members
 from adv2e.formats.event_file import EventFile
-from adv2e.formats.lookup import format_of, may_hold_events
 from adv2e.formats.reading import open_events
+from adv2e.formats.registry import format_of, may_hold_events
 from adv2e.options import SourceOptions, takes
 from adv2e.sources import STDIN, open_source
 from adv2e.sources.base import Source

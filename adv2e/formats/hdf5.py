@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from adv2e.errors import DataError
 from adv2e.files.expansion import check_expansion
 from adv2e.formats.column_names import SIZE_NAMES, named_geometry, unit_of_attribute
-from adv2e.formats.event_file import Columns, Facts
+from adv2e.formats.event_file import Facts
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.tracks import Track, counted
 
@@ -198,29 +198,6 @@ def unit_of(column: h5py.Dataset) -> str | None:
         if isinstance(value, (bytes, str)):
             return unit_of_attribute(value if isinstance(value, str) else value.decode("latin-1"))
     return None
-
-
-def columns(file: h5py.File, names: tuple[str, ...]) -> list[h5py.Dataset]:
-    """Return times, columns, rows and polarities of the events; DataError if they cannot be."""
-    found = [dataset(file, name) for name in names]
-    if len({column.shape for column in found}) != 1 or found[0].ndim != 1:
-        shapes = ", ".join(f"{name} {c.shape}" for name, c in zip(names, found, strict=True))
-        raise DataError(f"{file.filename}: columns must be of one length, got {shapes}")
-    for name, column, kinds in zip(names, found, ("fiu", "iu", "iu", "biuf"), strict=True):
-        if column.dtype.kind not in kinds:
-            raise DataError(f"{file.filename}: {name} must hold numbers, not {column.dtype}")
-    check_stored(found, f"{file.filename}: {names[0].rpartition('/')[0]}")
-    return found
-
-
-def parts(path: Path, names: tuple[str, ...], facts: Facts) -> Iterator[Columns]:
-    """Yield the columns of :func:`columns`, a part of the events at a time."""
-    with opened(path) as file:
-        found = columns(file, names)
-        for begin in range(0, found[0].size, PART):
-            t, x, y, p = (column[begin : begin + PART] for column in found)
-            yield t, x, y, signs(p)
-            facts.progress(begin + t.size, found[0].size)
 
 
 def signs(p: NDArray[Any]) -> NDArray[np.int8]:

@@ -18,8 +18,8 @@ from adv2e.formats.assembly import assemble
 from adv2e.formats.causes import beside as beside_of_causes
 from adv2e.formats.causes import found_beside
 from adv2e.formats.event_file import Columns, EventFile, Facts, Progress, rotated180
-from adv2e.formats.lookup import format_of
 from adv2e.formats.recording import Recording
+from adv2e.formats.registry import format_of
 from adv2e.geometry import MOST_PIXELS
 from adv2e.options import EventInput, size_of, takes
 from adv2e.process.machine import machine_complaint

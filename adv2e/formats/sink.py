@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
@@ -19,7 +19,9 @@ from adv2e.events import Events
 from adv2e.files.names import beside
 from adv2e.files.staging import Staging, writing
 from adv2e.formats import causes
-from adv2e.formats.registry import Format
+
+if TYPE_CHECKING:
+    from adv2e.formats.registry import Format
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,16 +134,15 @@ class Sink:
                 " format, such as .h5"
             )
 
-    def _check_times(self, events: Events) -> None:
-        """Refuse times that would be wrapped or cut; `events` are sorted."""
+    def _check_time(self, t_us: int, what: str) -> None:
+        """Refuse a time [us] that would be wrapped or cut."""
         first, last = self._format.first_us, self._format.last_us
-        for t in (int(events["t"][0]), int(events["t"][-1])):
-            if not first <= t <= last:
-                raise OutputError(
-                    f"{self._name}: an event at {t / 1e6:.6f} s does not fit"
-                    f" {self._format.what}, which holds times from {first / 1e6:.6f} to"
-                    f" {last / 1e6:.6f} s; --t0 zero may help, or another format, such as .h5"
-                )
+        if not first <= t_us <= last:
+            raise OutputError(
+                f"{self._name}: {what} at {t_us / 1e6:.6f} s does not fit"
+                f" {self._format.what}, which holds times from {first / 1e6:.6f} to"
+                f" {last / 1e6:.6f} s; --t0 zero may help, or another format, such as .h5"
+            )
 
     @contextmanager
     def _opened(
@@ -176,7 +177,8 @@ class Sink:
             They go to standard output, and nobody reads them any more.
         """
         if events.size:
-            self._check_times(events)
+            for t in (int(events["t"][0]), int(events["t"][-1])):
+                self._check_time(t, "an event")
         with writing(self._name):
             if self._causes is not None:
                 self._lines.write(causes.lines_of(events["cause"]))
@@ -189,6 +191,7 @@ class Sink:
         long before the events around it.
         """
         if self.wants_frames:
+            self._check_time((t_ns + 500) // 1000, "a frame")
             with writing(self._name):
                 self._writer.write_frame(t_ns, image)
 

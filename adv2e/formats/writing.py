@@ -23,8 +23,8 @@ from adv2e.errors import DataError, warn
 from adv2e.events import EVENT_DTYPE, Events, checked_events
 from adv2e.files.staging import Staging
 from adv2e.formats.causes import check_numbers
-from adv2e.formats.lookup import to_write
 from adv2e.formats.recording import Recording
+from adv2e.formats.registry import to_write
 from adv2e.formats.sink import Request, Sink
 
 _NO_FRAMES = (
@@ -61,10 +61,10 @@ def open_sink(
     metadata : dict
         What JSON can hold; stored inside, or in ``<path>.json`` where a format cannot hold it.
     format : str, optional
-        See :func:`adv2e.formats.lookup.names`; default: by the suffix, a path without one is a
+        See :func:`adv2e.formats.registry.names`; default: by the suffix, a path without one is a
         folder.
     layout : str, optional
-        See :func:`adv2e.formats.lookup.layouts`, for HDF5.
+        See :func:`adv2e.formats.registry.layouts`, for HDF5.
     overwrite : bool
         Replace, at the end, what exists.
     with_frames : bool

@@ -14,8 +14,8 @@ from adv2e.errors import DataError, UsageError
 from adv2e.files.names import shown
 from adv2e.files.regular import check_ends
 from adv2e.files.zips import Members
-from adv2e.formats.lookup import may_hold_events
 from adv2e.formats.reading import Recording, read_events
+from adv2e.formats.registry import may_hold_events
 from adv2e.inspection.events import describe_events, oddities_of
 from adv2e.light.decoding import light_text
 from adv2e.options import EventInput, FrameInput, InfoOptions, chosen, declared, takes

@@ -19,7 +19,7 @@ from adv2e.config.files import find
 from adv2e.config.model import Pixel
 from adv2e.diagnosis.fitting.library import names
 from adv2e.effects import EFFECTS, STAGES
-from adv2e.formats import lookup
+from adv2e.formats import registry
 
 
 @pytest.mark.parametrize("option", ["--version", "-V"])
@@ -63,8 +63,8 @@ def test_examples_in_the_help_stand_line_by_line(adv2e, command):
 def test_the_help_of_convert_names_what_can_be_written(adv2e):
     out = " ".join(adv2e("convert", "--help").out.split())
     named = re.search(r"Write this format, whatever the suffix. One of: ([a-z0-9, ]+)\.", out)
-    assert re.split(", | or ", named[1]) == lookup.names()
-    known = lookup.layouts()
+    assert re.split(", | or ", named[1]) == registry.names()
+    known = registry.layouts()
     assert f"Layout of an HDF5 output. One of: {', '.join(known)}. [default: {known[0]}]" in out
 
 

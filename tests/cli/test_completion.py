@@ -12,7 +12,7 @@ import pytest
 from adv2e.cli import COMMANDS
 from adv2e.config import all_keys, shipped
 from adv2e.effects import EFFECTS
-from adv2e.formats import lookup
+from adv2e.formats import registry
 
 
 @pytest.fixture
@@ -46,8 +46,8 @@ def offered(adv2e, monkeypatch):
         ("adv2e convert -c ", shipped()),
         ("adv2e convert -c davis", ["davis240c", "davis346"]),
         ("adv2e config show -c pa", ["paper"]),
-        ("adv2e convert --format ", lookup.names()),
-        ("adv2e convert --layout ", lookup.layouts()),
+        ("adv2e convert --format ", registry.names()),
+        ("adv2e convert --layout ", registry.layouts()),
         (
             "adv2e convert --set pixel.hot",
             [f"pixel.hot_pixels.{name}=" for name in ("fraction", "rate_hz", "spread")],

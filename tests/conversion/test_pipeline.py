@@ -352,7 +352,7 @@ def no_room(*args):
 
 @pytest.mark.parametrize(
     "fails",
-    ["adv2e.formats.monash.writer.MonashWriter.finish", "adv2e.rendering.films.GifFile.finish"],
+    ["adv2e.formats.hdf5_writer.MonashWriter.finish", "adv2e.rendering.films.GifFile.finish"],
 )
 @pytest.mark.thorough
 def test_events_and_preview_come_together_or_not_at_all(adv2e, video, tmp_path, monkeypatch, fails):

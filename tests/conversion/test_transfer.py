@@ -17,7 +17,7 @@ from streams import random_events
 import adv2e
 from adv2e.errors import DataError, OutputError, UsageError
 from adv2e.events import make_events
-from adv2e.formats.monash import reader
+from adv2e.formats.hdf5_layouts import Layout
 from adv2e.formats.writing import open_sink
 
 WIDTH, HEIGHT = 30, 20
@@ -330,8 +330,8 @@ def failing_disk(opened, at):
         if next(count) == at:
             raise OSError(errno.EIO, "Input/output error")
 
-    def open_failing(path, facts):
-        file = opened(path, facts)
+    def open_failing(layout, path, facts):
+        file = opened(layout, path, facts)
 
         def parts():
             for part in file.parts():
@@ -351,7 +351,7 @@ def failing_disk(opened, at):
 def test_a_disk_that_fails_is_told_in_one_line_and_nothing_is_left(adv2e, monkeypatch, at):
     write("a.h5", events_of(), frames_of(2))
     # the events twice, and a frame for what is stored of it, and to store it
-    monkeypatch.setattr(reader, "open_monash", failing_disk(reader.open_monash, at))
+    monkeypatch.setattr(Layout, "open", failing_disk(Layout.open, at))
     told = adv2e("convert", "a.h5", "-o", "b.zip", "--from", "events")
     assert told.status == 1
     assert told.err == "adv2e: error: a.h5: cannot be read: Input/output error\n"

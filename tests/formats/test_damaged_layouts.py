@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from adv2e.errors import DataError
 from adv2e.events import make_events
-from adv2e.formats.lookup import layouts
 from adv2e.formats.reading import read_events
+from adv2e.formats.registry import layouts
 from adv2e.formats.writing import open_sink
 
 pytestmark = pytest.mark.thorough

@@ -7,9 +7,8 @@ import pytest
 from adv2e.errors import DataError, OutputError
 from adv2e.events import make_events, sort_events
 from adv2e.formats.hdf5_writer import CHUNK
-from adv2e.formats.lookup import layouts
 from adv2e.formats.reading import read_events
-from adv2e.formats.registry import FORMATS
+from adv2e.formats.registry import FORMATS, layouts
 from adv2e.formats.writing import open_sink
 
 EPOCH_US = 1_468_941_032_229_165
@@ -169,7 +168,7 @@ def test_v2e_as_its_readers_have_it(tmp_path):
 
 @pytest.mark.parametrize("t_ns", [-1000, (1 << 32) * 1000])
 def test_v2e_refuses_frames_whose_times_it_cannot_hold(tmp_path, t_ns):
-    with pytest.raises(OutputError, match=r"a\.h5: a frame at .* does not fit the layout v2e"):
+    with pytest.raises(OutputError, match=r"a\.h5: a frame at .* does not fit HDF5 of v2e"):
         write(tmp_path / "a.h5", "v2e", [(t_ns, grey(0)), many(9)])
     assert list(tmp_path.iterdir()) == []
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.formats.monash.reader import COLUMNS
+from adv2e.formats.hdf5_layouts import MONASH
 from adv2e.formats.reading import read_events
 
 VALUES = {"events/ts": [0.1, 0.2, 0.3], "events/xs": [1, 2, 0], "events/ys": [0, 1, 1],
@@ -97,7 +97,7 @@ ELSEWHERE = [
 ]
 
 
-@pytest.mark.parametrize("name", [*COLUMNS, "images/image000000000"])
+@pytest.mark.parametrize("name", [*MONASH.datasets, "images/image000000000"])
 @pytest.mark.parametrize(("make", "message"), ELSEWHERE)
 def test_what_is_elsewhere_is_refused_by_name(tmp_path, name, make, message):
     secret = whole(tmp_path / "secret.h5")
@@ -119,7 +119,7 @@ from adv2e.formats.reading import read_events
 folder = Path(sys.argv[2])
 secret = made.whole(folder / "secret.h5")
 for make in (made.virtual, made.virtual_of_itself):
-    for number, name in enumerate([*made.COLUMNS, "images/image000000000"]):
+    for number, name in enumerate([*made.MONASH.datasets, "images/image000000000"]):
         path = made.changed(folder / f"{make.__name__}{number}.h5", name, make(name, secret))
         try:
             list(read_events(path).images())
@@ -203,7 +203,7 @@ def test_events_of_which_nothing_is_there(tmp_path, packed):
     path = tmp_path / "a.h5"
     count = 1 << (27 if packed else 40)
     with h5py.File(path, "w") as file:
-        for name in COLUMNS:
+        for name in MONASH.datasets:
             made = file.create_dataset(
                 name, (count,), "i1", chunks=(1 << 24,), compression="gzip" if packed else None
             )
