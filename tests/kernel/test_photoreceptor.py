@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from differences import STEP_S, Truth
 from harness import EVERYTHING, advance, quiet, solve, start
 from reference.agreement import count_and_time_errors
+from reference.differences import STEP_S, Truth
 from scipy import interpolate, linalg
 
 from adv2e.causes import LEAK, PHOTORECEPTOR_NOISE
