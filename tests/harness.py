@@ -23,6 +23,7 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
+from adv2e.effects.hooks import Hooks, View
 from adv2e.kernel import per_pixel
 from adv2e.pixel.array import PixelArray
 
@@ -73,6 +74,17 @@ def quiet(**sections):
 def pure(**sections):
     """Return a quiet pixel whose response is a logarithm everywhere."""
     return quiet(log_response=LogResponse(linear_below=0), **sections)
+
+
+def effect(shape, step_us=100.0, module=__name__, **methods):
+    """Return an effect of the `methods` given, which has begun on pixels of `shape`.
+
+    `module` says whose it is.
+    """
+    own = {name: staticmethod(method) for name, method in methods.items()}
+    made = type("Made", (Hooks,), {"__module__": module, "step_us": step_us, **own})()
+    made.begin(View(*shape, 0, 0.0))
+    return made
 
 
 def last_flags(knots, L, printed):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from harness import pure, solve
+from harness import effect, pure, solve
 from reference.differences import LIGHT, TIMES, Truth, check
 
 from adv2e.config.model import Refractory, ResetOvershoot
-from adv2e.effects.courses import INJECTED_DTYPE, Additions
+from adv2e.effects.hooks import INJECTED_DTYPE
 from adv2e.errors import ConfigError
 
 
@@ -26,7 +26,7 @@ def test_reset_overshoot_and_noise_events(fraction, dead_us):
         return np.array(rows, INJECTED_DTYPE)
 
     options = {
-        "additions": Additions(longest_step_us=lambda a, b: 1000.0, inject=inject),
+        "hooks": [effect((1, LIGHT.shape[1]), inject=inject)],
         "chunk": 3,
     }
     found = solve(LIGHT, TIMES, pure(**sections), **options)

@@ -20,7 +20,7 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
-from adv2e.effects.courses import LONGEST_US
+from adv2e.effects.hooks import LONGEST_US
 from adv2e.kernel import per_pixel, rng
 from adv2e.kernel.cascade.plan import plan_for
 from adv2e.kernel.photoreceptor import law

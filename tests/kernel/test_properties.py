@@ -1,7 +1,7 @@
 """What must hold of any stimulus."""
 
 import numpy as np
-from harness import QUIET, advance, by_pixel, quiet, solve, start
+from harness import QUIET, advance, by_pixel, effect, quiet, solve, start
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,7 +14,6 @@ from adv2e.config.model import (
     SlewLimit,
     Thresholds,
 )
-from adv2e.effects.courses import Additions
 from adv2e.kernel import per_pixel
 
 LIGHTS = st.lists(st.floats(0.0, 255.0, width=32), min_size=2, max_size=8)
@@ -115,9 +114,9 @@ def test_whatever_the_light_events_are_in_order_and_apart(light, fraction, slew,
 @given(light=MANY, offset=st.floats(-3.0, 3.0))
 def test_a_constant_added_to_the_signal_changes_nothing(light, offset):
     times = np.arange(len(light)) * 0.01
-    added = Additions(longest_step_us=lambda a, b: 1e3, signal=lambda t: np.full(t.shape, offset))
+    added = effect((1, 3), 1e3, signal=lambda t: np.full(t.shape, offset))
     plain = solve(np.array(light), times, quiet(), method="stepped")
-    found = solve(np.array(light), times, quiet(), additions=added)
+    found = solve(np.array(light), times, quiet(), hooks=[added])
     for a, b in zip(found, plain, strict=True):
         assert np.array_equal(a[:, 1], b[:, 1])
         # where the signal hardly moves, rounding shows

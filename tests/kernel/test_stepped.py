@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from harness import advance, by_pixel, clock, moving_light, quiet, solve, start
+from harness import advance, by_pixel, clock, effect, moving_light, quiet, solve, start
 from reference.agreement import count_and_time_errors
 from reference.differences import STEP_S, Truth
 
@@ -23,7 +23,6 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
-from adv2e.effects.courses import Additions
 from adv2e.errors import UsageError
 from adv2e.kernel import rng
 from adv2e.pixel.array import make_circuit
@@ -148,14 +147,14 @@ def test_method_is_one_of_two():
         start(np.ones((2, 3)), [0, 1], quiet(), method="fast")
 
 
-def test_additions_of_nothing_change_nothing():
+def test_an_effect_that_adds_nothing_changes_nothing():
     light, times = moving_light(9, 40, seed=2), clock(9, 1 / 240)
     times_ns = [round(t * 1e9) for t in times]
     arrays = [
         start(light, times_ns, quiet(), exact_times=True, **options)
         for options in (
             {"method": "stepped"},
-            {"additions": Additions(longest_step_us=lambda a, b: math.inf)},
+            {"hooks": [effect((1, 40), math.inf, signal=lambda t: None)]},
         )
     ]
     one, two = (by_pixel(array, *advance(array, light, times_ns)) for array in arrays)

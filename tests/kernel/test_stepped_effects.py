@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from harness import pure, solve
+from harness import effect, pure, solve
 from reference.agreement import count_and_time_errors
 from reference.differences import LIGHT, PURE, TIMES, Truth, check
 from reference.twin import light_of
 
 from adv2e.config.model import Refractory, ResetOvershoot, SlewLimit, SourceFollower, Thresholds
-from adv2e.effects.courses import Additions
 
 DEAD = {"refractory": Refractory(period_us=900.0)}
 
@@ -22,21 +21,20 @@ def wave(share, frequency):
 def test_drive_signal_and_thresholds_that_change(wide):
     """Courses for all pixels alike, and one a pixel."""
     shape = np.linspace(0.5, 1.5, LIGHT.shape[1]) if wide else np.ones(1)
+    ones = np.ones((1, LIGHT.shape[1]))
 
     def course(values):
-        return lambda t: values(t)[:, None] * shape if wide else values(t)
+        return lambda t: values(t)[:, None, None] * shape[None] if wide else values(t)
 
     drive, signal = wave(0.3, 120.0), lambda t: 0.1 * np.cos(2 * np.pi * 90.0 * t)
     factor = lambda t: 1 + 0.3 * np.sin(2 * np.pi * 37.0 * t)  # noqa: E731
-    ones = np.ones(LIGHT.shape[1])
-    additions = Additions(
-        longest_step_us=lambda a, b: 25.0,
-        drive=course(drive),
-        signal=course(signal),
-        on=(lambda t: factor(t)[:, None] * ones) if wide else factor,
-        off=factor,
-    )
-    found = solve(LIGHT, TIMES, pure(**DEAD), additions=additions)
+
+    def thresholds(t):
+        return factor(t)[:, None, None] * ones if wide else factor(t), factor(t)
+
+    courses = {"drive": course(drive), "signal": course(signal), "thresholds": thresholds}
+    added = effect((1, LIGHT.shape[1]), 25.0, **courses)
+    found = solve(LIGHT, TIMES, pure(**DEAD), hooks=[added])
     truth = Truth.of_light(
         LIGHT,
         TIMES,
