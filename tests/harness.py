@@ -1,12 +1,14 @@
-"""Runs the compiled pixel on light given directly, and returns exact times pixel by pixel."""
+"""The compiled pixel on light given directly, with exact times pixel by pixel; and its twin."""
 
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
-from reference.agreement import split_by_pixel
+from reference.agreement import count_and_time_errors, split_by_pixel
 from reference.circuit import Draws
+from reference.twin import simulate_twin
 
 from adv2e.config.model import (
     HotPixels,
@@ -21,6 +23,7 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
+from adv2e.effects.hooks import Hooks, View
 from adv2e.kernel import per_pixel
 from adv2e.pixel.array import PixelArray
 
@@ -53,6 +56,10 @@ STEPPED_FORM = {
 """A form of the low-pass in K steps, and a second pole."""
 
 
+PIXELS, SECONDS = 3000, 4.0
+"""Size and length of a recording at rest, from which rates are counted."""
+
+
 def quiet(**sections):
     """Return a pixel without noise, dead time and mismatch, but for the sections given."""
     base = {
@@ -62,6 +69,22 @@ def quiet(**sections):
         "initial_reference": "settled",
     }
     return Pixel(**{**base, **sections})
+
+
+def pure(**sections):
+    """Return a quiet pixel whose response is a logarithm everywhere."""
+    return quiet(log_response=LogResponse(linear_below=0), **sections)
+
+
+def effect(shape, step_us=100.0, module=__name__, **methods):
+    """Return an effect of the `methods` given, which has begun on pixels of `shape`.
+
+    `module` says whose it is.
+    """
+    own = {name: staticmethod(method) for name, method in methods.items()}
+    made = type("Made", (Hooks,), {"__module__": module, "step_us": step_us, **own})()
+    made.begin(View(*shape, 0, 0.0))
+    return made
 
 
 def last_flags(knots, L, printed):
@@ -134,3 +157,55 @@ def solve(light, times_s, pixel, *, begin=None, **options):
         begin(array)
     events, exact = advance(array, light, times_ns, **run)
     return by_pixel(array, events, exact)
+
+
+def at_rest(dn, pixel, seconds=SECONDS, pixels=PIXELS, frames=5, seed=3):
+    """Return (events, exact times [us]) of pixels that see the constant light `dn`."""
+    light = np.full((frames, 1, pixels), dn, np.float32)
+    times = [round(k * seconds / (frames - 1) * 1e9) for k in range(frames)]
+    array = start(light, times, pixel, seed=seed, exact_times=True)
+    return advance(array, light, times)
+
+
+def within(count, expected, sigmas=4.0):
+    """Tell whether a number of Poisson events is as expected."""
+    return abs(count - expected) <= sigmas * np.sqrt(expected)
+
+
+def moving_light(knots, pixels, seed=0, step=0.3):
+    """Return light that wanders, rests, returns to old values, and crosses the knee both ways."""
+    draw = np.random.default_rng(seed)
+    walk = np.exp(np.cumsum(draw.normal(0, step, (knots, pixels)), 0) + np.log(50))
+    walk = np.clip(walk, 0.3, 255)
+    walk[3:5, : pixels // 4] = walk[2, : pixels // 4]
+    walk[-2:, pixels // 4 : pixels // 2] = walk[0, pixels // 4 : pixels // 2]
+    walk[1, -1], walk[2, -1] = 3.0, 250.0
+    return walk.astype(np.float32).astype(np.float64)
+
+
+def check_against_twin(
+    light, times, pixel, circuit, draws=None, within_us=0.3, step_us=4.0, in_steps=False, **options
+):
+    """Compare the kernel with the twin; `in_steps`: the solver in steps of time, too."""
+    draws = draws or Draws()
+
+    def begin(array):
+        nonlocal draws
+        first = first_draws(array, draws.leak_factors)
+        draws = replace(first, injected=draws.injected)
+
+    kernel = solve(light, times, pixel, begin=begin, **options)
+    twin = simulate_twin(light, times, circuit, draws, step_us=step_us)
+    solved = [(kernel, within_us)]
+    if in_steps:
+        solved.append((solve(light, times, pixel, method="stepped", **options), 1.0))
+    for events, most_us in solved:
+        found = count_and_time_errors(events, twin)
+        assert found.count_b > 50
+        assert not found.differing
+        assert found.max_dt_us < most_us
+
+
+def clock(knots, interval_s):
+    """Return the times of `knots` even frames [s], in whole nanoseconds."""
+    return np.round(np.arange(knots) * interval_s * 1e9) * 1e-9

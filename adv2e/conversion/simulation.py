@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from adv2e.background import worker_pool
 from adv2e.config import Config, Written, load_config
 from adv2e.config.active_effects import active_hooks
-from adv2e.effects.composition import additions_of, begin, check_causes, map_events, overrides
+from adv2e.effects.composition import begin, check_causes, map_events, overrides
 from adv2e.effects.frames.brightness import bounded, check_floats
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Frames, Hooks
@@ -341,7 +341,7 @@ def _pixel_events(
         config.seed,
         first if table is None else table.take(first),
         t_ns,
-        additions=additions_of(hooks),
+        hooks=hooks,
         **options,
     )
     intervals = Intervals(t_ns, first, config.sampling, threads=array.threads)

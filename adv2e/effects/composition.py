@@ -6,7 +6,7 @@ import sys
 import traceback
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial, reduce
+from functools import reduce
 from itertools import chain
 from typing import Any
 
@@ -14,21 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.causes import CAUSED_DTYPE, FRAME_COUPLING, OWN_EFFECT, with_cause
-from adv2e.effects.courses import INJECTED_DTYPE, Additions, Course
-from adv2e.effects.hooks import Frames, Hooks, Times, View
+from adv2e.effects.hooks import INJECTED_DTYPE, Frames, Hooks, Times, View
 from adv2e.errors import Adv2eError, ConfigError, DataError
 from adv2e.events import EVENT_DTYPE, Events
 
 Array = NDArray[Any]
 
-_COURSES: dict[str, tuple[str, int | None, np.ufunc]] = {
+COURSES: dict[str, tuple[str, int | None, np.ufunc]] = {
     "gain": ("gain", None, np.multiply),
     "drive": ("drive", None, np.add),
     "signal": ("signal", None, np.add),
     "on": ("thresholds", 0, np.multiply),
     "off": ("thresholds", 1, np.multiply),
 }
-"""Method of each course, index of the course in its result, and operation that combines effects."""
+"""Courses by time that act on the pixels: method, index in its result, and how effects combine."""
 
 
 def overrides(hook: Hooks, method: str) -> bool:
@@ -75,28 +74,17 @@ def _light(hook: Hooks, frames: Frames, shape: tuple[int, ...]) -> Frames:
             yield t_ns, light
 
 
-def additions_of(hooks: Sequence[Hooks]) -> Additions | None:
-    """Return the combined courses of all effects inside the pixel; None: there are none."""
-    courses: dict[str, Course] = {}
-    for name, (method, part, combine) in _COURSES.items():
-        of = [hook for hook in hooks if overrides(hook, method)]
-        if of:
-            courses[name] = partial(_together, of, method, part, combine)
-    injecting = [hook for hook in hooks if overrides(hook, "inject")]
-    if not courses and not injecting:
-        return None
-    methods = {method for method, *_ in _COURSES.values()}
-    timed = [hook for hook in hooks if any(overrides(hook, method) for method in methods)]
-    return Additions(
-        longest_step_us=partial(_shortest_us, timed),
-        inject=partial(_injected, injecting) if injecting else None,
-        cause=_cause_of_signal(hooks),
-        **courses,
-    )
+def inside_pixel(hooks: Iterable[Hooks]) -> list[Hooks]:
+    """Return the effects that act inside the pixel; if there are none, it is solved faster."""
+    return [hook for hook in hooks if _is_timed(hook) or overrides(hook, "inject")]
 
 
-def _cause_of_signal(hooks: Sequence[Hooks]) -> int:
-    """Return the cause of events by additions of the effects to the signal."""
+def _is_timed(hook: Hooks) -> bool:
+    return any(overrides(hook, method) for method, *_ in COURSES.values())
+
+
+def cause_of_signal(hooks: Sequence[Hooks]) -> int:
+    """Return the cause of events by what effects add to the signal."""
     return OWN_EFFECT if any(map(_is_own, _adding(hooks))) else FRAME_COUPLING
 
 
@@ -119,10 +107,10 @@ def _is_own(hook: Hooks) -> bool:
     return not type(hook).__module__.startswith("adv2e.")
 
 
-def _shortest_us(hooks: Sequence[Hooks], start_s: float, stop_s: float) -> float:
-    """Return the longest time step that resolves what all of `hooks` add [us]."""
+def longest_step_us(hooks: Sequence[Hooks], start_s: float, stop_s: float) -> float:
+    """Return the longest time step that resolves the courses of all `hooks` [us]."""
     shortest = np.inf
-    for hook in hooks:
+    for hook in filter(_is_timed, hooks):
         with blamed(hook):
             found = float(hook.longest_step_us(start_s, stop_s))
         if not found > 0.0:
@@ -131,12 +119,15 @@ def _shortest_us(hooks: Sequence[Hooks], start_s: float, stop_s: float) -> float
     return shortest
 
 
-def _together(
-    hooks: Sequence[Hooks], method: str, part: int | None, combine: np.ufunc, times_s: Times
-) -> Array:
-    """Return the sum or product of what a method of all `hooks` gives, (n, 1) or (n, pixels)."""
-    values = (_values(hook, method, part, combine, times_s) for hook in hooks)
-    return np.asarray(reduce(combine, values))
+def course(hooks: Sequence[Hooks], name: str, times_s: Times) -> Array | None:
+    """Return a course of all `hooks` together at times [s], (n, 1) or (n, pixels); None: no course.
+
+    It is a straight line between the ends of a step; pixels are in row-major order.
+    """
+    method, part, combine = COURSES[name]
+    of = [hook for hook in hooks if overrides(hook, method)]
+    values = (_values(hook, method, part, combine, times_s) for hook in of)
+    return np.asarray(reduce(combine, values)) if of else None
 
 
 def _values(hook: Hooks, method: str, part: int | None, combine: np.ufunc, times_s: Times) -> Array:
@@ -160,10 +151,10 @@ def _values(hook: Hooks, method: str, part: int | None, combine: np.ufunc, times
     return value.reshape(times_s.size, -1)
 
 
-def _injected(hooks: Sequence[Hooks], start_s: float, stop_s: float) -> Array:
-    """Return the events that all of `hooks` inject, sorted by time."""
-    parts = []
-    for hook in hooks:
+def injected(hooks: Sequence[Hooks], start_s: float, stop_s: float) -> Array:
+    """Return the events that `hooks` inject, as INJECTED_DTYPE, sorted by time."""
+    parts = [np.empty(0, INJECTED_DTYPE)]
+    for hook in (hook for hook in hooks if overrides(hook, "inject")):
         with blamed(hook):
             found = np.asarray(hook.inject(start_s, stop_s))
         wrong = _injection_complaint(found, start_s, stop_s, hook.view)

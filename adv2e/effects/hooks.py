@@ -33,7 +33,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from adv2e.effects.courses import INJECTED_DTYPE, LONGEST_US
 from adv2e.events import Events
 from adv2e.kernel import rng
 from adv2e.parameters import Section
@@ -43,6 +42,12 @@ Times = NDArray[np.float64]
 
 Frames = Iterator[tuple[int, NDArray[Any]]]
 """Pairs of time [ns] and light [DN] (rows, columns), float32 or float64."""
+
+LONGEST_US = 100.0
+"""Longest step in which the circuit is solved, and courses are followed unless they say more."""
+
+INJECTED_DTYPE = np.dtype([("t", "<f8"), ("x", "<u2"), ("y", "<u2"), ("p", "u1")])
+"""Events to be injected: time [s], column, row, polarity (1 ON, 0 OFF)."""
 
 _OWN_STREAMS = 1 << 31
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
 from typing import Any
@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.background import default_threads
-from adv2e.causes import CAUSE_BITS, CAUSED_DTYPE, FRAME_COUPLING
+from adv2e.causes import CAUSE_BITS, CAUSED_DTYPE
 from adv2e.config.model import Pixel, Sampling
-from adv2e.effects.courses import LONGEST_US, Additions
+from adv2e.effects.composition import cause_of_signal, inside_pixel
+from adv2e.effects.hooks import LONGEST_US, Hooks
 from adv2e.effects.pixel.threshold_drift import drift_factors
 from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE, Events
@@ -65,8 +66,8 @@ class PixelArray:
         Most pixels that one call of the kernel advances; the events do not depend on it.
     exact_times : bool
         Keep unrounded times (`last_times`), for tests.
-    additions : Additions, optional
-        What effects outside the kernel add to the pixels.
+    hooks : sequence of Hooks
+        Effects that have begun; those that act inside the pixel do so here.
     method : {"auto", "stepped"}
         How the circuit is solved: the fastest way that covers it, or in steps of time.
     coarseness : Coarseness
@@ -91,7 +92,7 @@ class PixelArray:
         threads: int | None = None,
         tile: int | None = None,
         exact_times: bool = False,
-        additions: Additions | None = None,
+        hooks: Sequence[Hooks] = (),
         method: str = "auto",
         coarseness: Coarseness = PRECISE,
         causes: bool = False,
@@ -108,18 +109,18 @@ class PixelArray:
                 f"{self.columns}x{self.rows} pixels: at most {1 << PIXEL_BITS} are supported"
             )
         self.origin_us = t_ns // 1000
-        added = FRAME_COUPLING if additions is None else additions.cause
-        self.circuit = make_circuit(pixel, sampling, seed, causes, added)
+        inside = inside_pixel(hooks)
+        self.circuit = make_circuit(pixel, sampling, seed, causes, cause_of_signal(inside))
         self.threads = default_threads() if threads is None else max(1, threads)
         self.started = False
         self._drift_per_s = pixel.thresholds.drift_per_s
         self._level = min(pixel.thresholds.on, pixel.thresholds.off)
         self._start = start = self._relative(t_ns)
-        stepped = driver_of(pixel, self.circuit, additions, method) == "run_stepped"
+        stepped = driver_of(pixel, self.circuit, inside, method) == "run_stepped"
         self._stepping: Stepping | None = None
         if stepped:
             self._stepping = Stepping(
-                self.circuit, self.pixels, self.columns, additions, pixel.thresholds.drift_per_s,
+                self.circuit, self.pixels, self.columns, inside, pixel.thresholds.drift_per_s,
                 self.origin_us, start, coarseness,
             )  # fmt: skip
         light = first.reshape(-1)

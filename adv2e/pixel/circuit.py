@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from adv2e.causes import FRAME_COUPLING
 from adv2e.config.model import Pixel, Sampling
-from adv2e.effects.courses import Additions
+from adv2e.effects.hooks import Hooks
 from adv2e.effects.pixel.low_pass import UPDATES
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
 from adv2e.errors import UsageError
@@ -26,8 +27,8 @@ def make_circuit(
 ) -> Circuit:
     """Return the circuit of a configuration; rates [1/us], corners [rad/us].
 
-    With `causes`, events have a cause each; `added` is the cause of events by additions to the
-    signal.
+    With `causes`, events have a cause each; `added` is the cause of events by what effects add to
+    the signal.
     """
     low_pass, follower, leak = pixel.low_pass, pixel.source_follower, pixel.leak
     knee_dn = pixel.log_response.linear_below
@@ -68,9 +69,9 @@ def make_circuit(
     )
 
 
-def driver_of(pixel: Pixel, circuit: Circuit, additions: Additions | None, method: str) -> str:
-    """Return the name of the compiled function that advances these pixels."""
+def driver_of(pixel: Pixel, circuit: Circuit, inside: Sequence[Hooks], method: str) -> str:
+    """Return the name of the compiled function that advances pixels with effects inside them."""
     if method not in METHODS:
         raise UsageError(f"method: must be one of {', '.join(METHODS)}, got {method!r}")
-    steps = method == "stepped" or additions is not None or not covers(circuit)
+    steps = method == "stepped" or bool(inside) or not covers(circuit)
     return "run_stepped" if steps else "run_exact"

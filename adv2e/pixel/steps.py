@@ -22,13 +22,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.effects.courses import LONGEST_US, Additions, Course
+from adv2e.effects.composition import COURSES, course, injected, longest_step_us, overrides
+from adv2e.effects.hooks import LONGEST_US, Hooks
 from adv2e.effects.pixel.threshold_drift import drift_factors
 from adv2e.kernel.circuit import EXACT, Circuit, fastest_corner
 from adv2e.kernel.frames import Frames
@@ -50,8 +51,6 @@ _FEWEST, _SHORT_US = 4, 10.0
 
 _VALUES = 1 << 22
 """Values of a course that are in memory at a time, unless one block of steps has more."""
-
-_COURSES = ("gain", "drive", "signal", "on", "off")
 
 _NONE = np.zeros((0, 1))
 _NO_INDEX = np.zeros(0, np.int64)
@@ -124,7 +123,8 @@ class Stepping:
     pixels : int
         Those that are advanced: the first so many.
     columns : int
-    additions : Additions, optional
+    hooks : sequence of Hooks
+        Effects that act inside the pixel.
     drift_per_s : float
         Of the thresholds.
     origin_us : int
@@ -135,15 +135,15 @@ class Stepping:
     """
 
     def __init__(
-        self, circuit: Circuit, pixels: int, columns: int, additions: Additions | None,
+        self, circuit: Circuit, pixels: int, columns: int, hooks: Sequence[Hooks],
         drift_per_s: float, origin_us: int, start_us: float, coarseness: Coarseness = PRECISE,
     ) -> None:  # fmt: skip
         self._circuit, self._pixels, self._columns = circuit, pixels, columns
-        self._additions = additions
+        self._hooks = hooks
         self._drift, self._origin, self._start = drift_per_s, origin_us, start_us
         self._coarseness = coarseness
         at = np.array([start_us])
-        widths = (self._course(name, at).shape[1] for name in _COURSES)
+        widths = (self._course(name, at).shape[1] for name in COURSES)
         self._width = sum(width for width in widths if width > 1)
 
     def first_driven(self, x: NDArray[np.float64]) -> NDArray[Any]:
@@ -214,16 +214,12 @@ class Stepping:
 
     def _longest_step_us(self, start_s: float, stop_s: float) -> float:
         """Return the longest step that resolves what is added between two times [us]."""
-        added = self._additions
-        return math.inf if added is None else added.longest_step_us(float(start_s), float(stop_s))
+        return longest_step_us(self._hooks, float(start_s), float(stop_s))
 
     def _course(self, name: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a course at times since the origin [us], without rows if there is none."""
-        course: Course | None = getattr(self._additions, name, None)
-        if course is None:
-            return _NONE
-        values = np.asarray(course(self._seconds(times)), np.float64)
-        return np.ascontiguousarray(values.reshape(times.size, -1)[:, : self._pixels])
+        values = course(self._hooks, name, self._seconds(times))
+        return _NONE if values is None else np.ascontiguousarray(values[:, : self._pixels])
 
     def _factors(self, name: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the factors on a threshold, drift and course together."""
@@ -235,10 +231,10 @@ class Stepping:
 
     def _injected(self, t0_us: float, t1_us: float) -> Injected:
         """Return the events that are injected in a run."""
-        if self._additions is None or self._additions.inject is None:
+        if not any(overrides(hook, "inject") for hook in self._hooks):
             return _NOTHING
         t0, t1 = (float(t) for t in self._seconds(np.array([t0_us, t1_us])))
-        found = self._additions.inject(t0, t1)
+        found = injected(self._hooks, t0, t1)
         pixels = found["y"].astype(np.int64) * self._columns + found["x"]
         # seconds and back: rounding must not take an event out of its run
         at = np.clip(found["t"] * 1e6 - self._origin, t0_us, np.nextafter(t1_us, -math.inf))

@@ -383,6 +383,12 @@ def test_an_unknown_effect_is_of_usage_and_told_the_nearest(adv2e):
     assert "did you mean 'low_pass'?" in outcome.err
 
 
+def test_all_effects_or_one_of_them(adv2e):
+    outcome = adv2e("effects", "leak", "--all")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "NAME and --all" in outcome.err
+
+
 def test_the_table_of_effects_agrees_with_the_configuration():
     sections = [
         item.name

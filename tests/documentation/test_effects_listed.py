@@ -1,4 +1,4 @@
-"""The document on effects lists those that there are, and its example does what it says."""
+"""The page of the effects is as it is generated now, and the example of the document runs."""
 
 from __future__ import annotations
 
@@ -17,12 +17,20 @@ DOCUMENT = Document.read(ROOT / "adv2e" / "effects" / "README.md")
 (EXAMPLE,) = (block.text for block in DOCUMENT.blocks if block.file == "echo.py")
 
 
-def test_all_effects_are_listed_in_their_order():
-    text = "\n".join(line for _, line in DOCUMENT.prose)
-    rows = re.findall(r"^\| `(\w+)` \| `([\w.]+)` \| .+\. \|$", text, flags=re.MULTILINE)
-    assert [name for name, _ in rows] == [effect.name for effect in EFFECTS]
-    for (_, key), effect in zip(rows, EFFECTS, strict=True):
-        assert key in effect.paths
+def test_the_page_of_the_effects_is_the_one_that_is_written_now(adv2e):
+    """If not: adv2e effects --all > docs/effects.md."""
+    assert adv2e("effects", "--all") == (0, (ROOT / "docs" / "effects.md").read_text("ascii"), "")
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_a_page_says_where_the_effect_acts_and_is_tested(adv2e, effect):
+    page = adv2e("effects", effect.name).out
+    assert re.search(r"^adv2e/effects/\S+ \(hooks: \w", page, re.M) or re.search(
+        r"^(Compiled|Applied) in adv2e/", page, re.M
+    )
+    paths = re.findall(r"\b(?:adv2e|tests)/[\w/.]*\w", page)
+    assert f"tests/effects/test_{effect.own_module or effect.name}.py" in paths
+    assert not [path for path in paths if not (ROOT / path).exists()]
 
 
 def test_effect_of_ones_own_runs(adv2e, tmp_path, monkeypatch):

@@ -8,9 +8,15 @@ import pytest
 from adv2e import load_config, simulate
 from adv2e.config.active_effects import active_hooks
 from adv2e.config.model import Pixel, Sampling
-from adv2e.effects.composition import additions_of, begin, map_events
-from adv2e.effects.courses import INJECTED_DTYPE
-from adv2e.effects.hooks import Hooks, View
+from adv2e.effects.composition import (
+    begin,
+    course,
+    injected,
+    inside_pixel,
+    longest_step_us,
+    map_events,
+)
+from adv2e.effects.hooks import INJECTED_DTYPE, Hooks, View
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.errors import ConfigError, DataError
 from adv2e.events import make_events
@@ -51,15 +57,15 @@ class Spots(Hooks):
         return np.full(times_s.size, 3.0), np.full(times_s.size, 3.0)
 
     def inject(self, start_s, stop_s):
-        return injected([start_s, 0.5 * (start_s + stop_s)], 1)
+        return rows_of([start_s, 0.5 * (start_s + stop_s)], 1)
 
 
 class Later(Hooks):
     def inject(self, start_s, stop_s):
-        return injected([0.75 * start_s + 0.25 * stop_s], 2)
+        return rows_of([0.75 * start_s + 0.25 * stop_s], 2)
 
 
-def injected(times, x):
+def rows_of(times, x):
     found = np.zeros(len(times), INJECTED_DTYPE)
     found["t"], found["x"] = times, x
     return found
@@ -83,7 +89,7 @@ def test_a_course_is_followed_every_100_us_in_a_diagnosis_too_unless_it_says_mor
 
     def steps(hook, coarseness):
         (begun_hook,) = begun(hook())
-        step_us = additions_of([begun_hook]).longest_step_us(0.0, 0.01)
+        step_us = longest_step_us([begun_hook], 0.0, 0.01)
         return steps_of(10_000.0, circuit, step_us, coarseness=coarseness)
 
     assert steps(Slow, Coarseness()) == steps(Slower, Coarseness()) == 100
@@ -113,13 +119,15 @@ def test_where_nothing_fires_there_is_an_array_without_events(sets, effects):
 
 
 def test_drives_add_up_and_factors_multiply():
-    found = additions_of(begun(Lamp(), Spots()))
-    assert found.longest_step_us(0.0, 1.0) == 40.0
-    np.testing.assert_array_equal(found.drive(TIMES), np.repeat(TIMES[:, None] + 1.0, 12, 1))
-    np.testing.assert_array_equal(found.gain(TIMES)[:, 0], 1.0 + TIMES)
-    np.testing.assert_array_equal(found.signal(TIMES)[:, 0], -TIMES)
-    np.testing.assert_array_equal(found.on(TIMES)[:, 0], [6.0] * 3)
-    np.testing.assert_array_equal(found.off(TIMES)[:, 0], [1.5] * 3)
+    both = begun(Lamp(), Spots())
+    assert longest_step_us(both, 0.0, 1.0) == 40.0
+    wide = np.repeat(TIMES[:, None] + 1.0, 12, 1)
+    np.testing.assert_array_equal(course(both, "drive", TIMES), wide)
+    np.testing.assert_array_equal(course(both, "gain", TIMES)[:, 0], 1.0 + TIMES)
+    np.testing.assert_array_equal(course(both, "signal", TIMES)[:, 0], -TIMES)
+    np.testing.assert_array_equal(course(both, "on", TIMES)[:, 0], [6.0] * 3)
+    np.testing.assert_array_equal(course(both, "off", TIMES)[:, 0], [1.5] * 3)
+    assert course(begun(Lamp()), "signal", TIMES) is None
 
 
 def test_steps_are_those_of_the_effect_that_needs_the_shortest_then():
@@ -127,22 +135,22 @@ def test_steps_are_those_of_the_effect_that_needs_the_shortest_then():
         def longest_step_us(self, start_s, stop_s):
             return 7.0 if start_s < 0.3 < stop_s else np.inf
 
-    found = additions_of(begun(Pulse(), Spots()))
-    assert found.longest_step_us(0.1, 0.2) == 70.0
-    assert found.longest_step_us(0.2, 0.4) == 7.0
-    assert additions_of(begun(Pulse())).longest_step_us(0.4, 0.5) == np.inf
-    assert additions_of(begun(Later())).longest_step_us(0.0, 1.0) == np.inf
+    both = begun(Pulse(), Spots())
+    assert longest_step_us(both, 0.1, 0.2) == 70.0
+    assert longest_step_us(both, 0.2, 0.4) == 7.0
+    assert longest_step_us(begun(Pulse()), 0.4, 0.5) == np.inf
+    assert longest_step_us(begun(Later()), 0.0, 1.0) == np.inf
 
 
 def test_injected_events_are_merged_by_time():
-    found = additions_of(begun(Spots(), Later())).inject(1.0, 2.0)
+    found = injected(begun(Spots(), Later()), 1.0, 2.0)
     assert found["t"].tolist() == [1.0, 1.25, 1.5]
     assert found["x"].tolist() == [1, 2, 1]
 
 
 def test_without_anything_inside_the_pixel_the_fast_path_stays():
     config = load_config([], ["frames.shift_px=[1, 0]", "readout.tick_us=10"])
-    assert additions_of(active_hooks(config)) is None
+    assert not inside_pixel(active_hooks(config))
 
 
 def test_frames_reach_each_effect_as_the_one_before_left_them():
@@ -235,8 +243,8 @@ BROKEN = {
     },
     "effect mine: longest_step_us: nan us": {"signal": lambda self, t: t, "step_us": np.nan},
     "effect mine: inject: must be .* got float64": {"inject": lambda self, a, b: np.zeros(2)},
-    "effect mine: inject: times must be sorted": {"inject": lambda self, a, b: injected([b], 0)},
-    "effect mine: inject: x must be below 4": {"inject": lambda self, a, b: injected([a], 4)},
+    "effect mine: inject: times must be sorted": {"inject": lambda self, a, b: rows_of([b], 0)},
+    "effect mine: inject: x must be below 4": {"inject": lambda self, a, b: rows_of([a], 4)},
     "effect mine: events: must yield arrays": {"events": lambda self, chunks: iter([[1, 2]])},
     "effect mine: events: times must not decrease": {
         "events": lambda self, chunks: iter([make_events([5, 3], [0, 0], [0, 0], [1, 1])])

@@ -5,11 +5,13 @@ import dataclasses
 import importlib
 import inspect
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from harness import advance, quiet, start
 
+import adv2e.effects
 from adv2e.config import Config, from_dict, to_dict
 from adv2e.config.model import (
     HotPixels,
@@ -25,7 +27,7 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
-from adv2e.errors import ConfigError
+from adv2e.effects import EFFECTS
 from adv2e.parameters import Section
 
 # for each section: parameters that do something here, and neutral ones (None: being absent)
@@ -61,6 +63,14 @@ def events(pixel):
 def test_every_section_is_tested():
     # the others work through hooks, and are tested as those are
     assert set(CASES) == set(SECTIONS) - {"dark_current", "dead_pixels"}
+
+
+def test_every_effect_has_a_test_of_its_name():
+    here = Path(__file__).parent
+    modules = Path(adv2e.effects.__file__).parent.glob("*/*.py")
+    names = [module.stem for module in modules if module.stem != "__init__"]
+    assert len(names) >= len(EFFECTS)
+    assert not [name for name in names if not (here / f"test_{name}.py").exists()]
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -118,37 +128,6 @@ def test_effects_do_not_import_each_other(name):
     for node in ast.walk(ast.parse(inspect.getsource(module))):
         if isinstance(node, ast.ImportFrom):
             assert not (node.module or "").startswith("adv2e.effects"), node.module
-
-
-def test_noise_without_the_filter_that_limits_it_is_an_error():
-    with pytest.raises(ConfigError, match="low_pass"):
-        Pixel(low_pass=None, photoreceptor_noise=PhotoreceptorNoise(rms=0.1))
-
-
-def test_a_slew_limit_without_the_filter_that_it_limits_is_an_error():
-    with pytest.raises(ConfigError, match=r"slew_limit: .*low_pass"):
-        Pixel(low_pass=None, slew_limit=SlewLimit(per_s=40.0))
-
-
-def test_an_overshoot_of_a_whole_threshold_is_an_error():
-    with pytest.raises(ConfigError, match=r"fraction: must be at most 0\.9"):
-        ResetOvershoot(fraction=1.0)
-
-
-def test_drift_does_something_and_is_none_by_default():
-    drifting = quiet(thresholds=Thresholds(mismatch=0.0, drift_per_s=4.0))
-    assert events(drifting).tobytes() != events(quiet()).tobytes()
-    assert Thresholds().drift_per_s == 0.0
-
-
-def test_full_darkness_without_a_dark_corner_is_defined():
-    pixel = quiet(
-        low_pass=LowPass(dark_cutoff_hz=0.0), photoreceptor_noise=PhotoreceptorNoise(rms=0.01)
-    )
-    light = np.zeros((3, 1, 8), np.float32)
-    light[2] = 200.0
-    times = [0, 4_000_000, 8_000_000]
-    assert len(advance(start(light, times, pixel), light, times)[0]) > 0
 
 
 def test_no_section_is_without_a_check():

@@ -127,33 +127,3 @@ def test_converting_a_file_gives_what_simulating_its_frames_does(adv2e, tmp_path
     lines = [f"{t / 1e6:.6f}000 {x} {y} {p}" for t, x, y, p in found.tolist()]
     assert (tmp_path / "out.txt").read_text("ascii").splitlines() == lines
     assert len(lines) > 100
-
-
-def test_frequency_of_flicker_is_that_of_the_rate():
-    def strongest_line(*sets):
-        """Return the frequency of the strongest line of ON events, and its power beside others."""
-        t = np.arange(501) / 500
-        y, x = np.mgrid[:12, :16]
-        moving = (
-            (110 + 90 * np.sin(0.5 * (x - 0.1 * k)) * np.cos(0.4 * y)).astype(np.uint8)
-            for k in range(t.size)
-        )
-        config = load_config([], [LIGHT, "sampling.L=1", *sets])
-        events = np.concatenate(list(simulate(moving, t, config)))
-        seconds = 1e-6 * events["t"][events["p"] == 1]
-        hz = np.arange(50.0, 240.0, 0.5)
-        power = np.abs(np.exp(-2j * np.pi * hz[:, None] * seconds).sum(axis=1)) ** 2
-        return hz[np.argmax(power)], power.max() / np.median(power)
-
-    frequency, strength = strongest_line("frames.flicker={frequency_hz: 118.5, depth: 0.25}")
-    assert frequency == 118.5
-    assert strength > 200
-    assert strongest_line()[1] < 50
-
-
-def test_dead_time_is_the_shortest_interval():
-    fast = events("pixel.refractory.period_us=1700", "pixel.thresholds={on: 0.05, off: 0.05}")
-    pixels = fast["y"].astype(np.int64) * COLUMNS + fast["x"]
-    order = np.lexsort((fast["t"], pixels))
-    apart = np.diff(fast["t"][order])[np.diff(pixels[order]) == 0]
-    assert 1699 <= apart.min() < 1750

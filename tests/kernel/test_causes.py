@@ -12,14 +12,17 @@ from harness import (
     IN_LANES,
     STEPPED_FORM,
     advance,
+    clock,
+    effect,
     first_draws,
+    moving_light,
     quiet,
     start,
 )
 from reference.agreement import count_and_time_errors, split_by_pixel
 from reference.circuit import Circuit, Draws, merge_injected
 from reference.twin import corner_of, light_of, log_of, moves_of_twin
-from test_twin import clock, hot_times, moving_light, shot_candidates
+from test_twin import hot_times, shot_candidates
 
 from adv2e.causes import (
     CAUSED_DTYPE,
@@ -44,7 +47,7 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
-from adv2e.effects.courses import INJECTED_DTYPE, Additions
+from adv2e.effects.hooks import INJECTED_DTYPE
 from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE
 from adv2e.kernel import per_pixel, rng
@@ -259,14 +262,13 @@ def test_what_is_added_to_the_signal(dead_us, cause):
     light = moving_light(knots, pixels, seed=8, step=0.2)
     times = clock(knots, 1 / 100)
     saw = np.arange(knots * 10) / 1000, np.tile([0.0, 0.24, 0.1, 0.05, 0.0], knots * 2)
-    additions = Additions(
-        longest_step_us=lambda a, b: 50.0, signal=lambda t: np.interp(t, *saw), cause=cause
-    )
+    whose = "adv2e.effects" if cause == FRAME_COUPLING else "mine"
+    added = effect((1, pixels), 50.0, whose, signal=lambda t: np.interp(t, *saw))
     pixel = quiet(
         refractory=Refractory(period_us=dead_us) if dead_us else None,
         leak=Leak(rate_hz=30, photo_rate_hz=30, jitter=0.0),
     )
-    found, causes = caused(light, times, pixel, additions=additions)
+    found, causes = caused(light, times, pixel, hooks=[added])
     draws = Draws(signal_noise=[saw] * pixels)
     circuit = Circuit(dead_time_us=dead_us, leak_hz=30.0, photo_leak_hz=30.0)
     twin, moves = moves_of_twin(light, times, circuit, draws, step_us=20.0)
@@ -281,8 +283,8 @@ def test_injected_events_are_the_user_s_own():
     def inject(t0, t1):
         return rows[(rows["t"] >= t0) & (rows["t"] < t1)]
 
-    additions = Additions(longest_step_us=lambda a, b: 100.0, inject=inject)
-    found, causes = caused(np.full((3, 2), 60.0), [0.0, 0.01, 0.02], quiet(), additions=additions)
+    hooks = [effect((1, 2), inject=inject)]
+    found, causes = caused(np.full((3, 2), 60.0), [0.0, 0.01, 0.02], quiet(), hooks=hooks)
     assert [now.tolist() for now in causes] == [[OWN_EFFECT], [OWN_EFFECT] * 2]
     assert [len(events) for events in found] == [1, 2]
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from harness import EVERYTHING, IN_LANES, advance, quiet, start
+from harness import EVERYTHING, IN_LANES, advance, effect, quiet, start
 
 from adv2e.config.model import LowPass, Pixel, ResetOvershoot, SlewLimit, Thresholds
-from adv2e.effects.courses import INJECTED_DTYPE, Additions
+from adv2e.effects.hooks import INJECTED_DTYPE
 from adv2e.pixel import steps as stepping
 
 FRAMES, ROWS, COLUMNS = 19, 48, 70
@@ -42,8 +42,8 @@ def clip():
     return stack
 
 
-def additions():
-    shape = 1.0 + 0.3 * np.sin(np.arange(ROWS * COLUMNS))
+def added():
+    shape = 1.0 + 0.3 * np.sin(np.arange(ROWS * COLUMNS)).reshape(ROWS, COLUMNS)
 
     def inject(t0, t1):
         k = np.arange(np.ceil(t0 / 1e-5), np.ceil(t1 / 1e-5)).astype(np.int64)
@@ -52,11 +52,15 @@ def additions():
         rows["t"], rows["x"], rows["y"], rows["p"] = k * 1e-5, k * 31 % COLUMNS, k % ROWS, k % 2
         return rows
 
-    return Additions(
-        longest_step_us=lambda a, b: 90.0,
-        drive=lambda t: 0.2 * np.sin(700 * t)[:, None] * shape,
+    def wide(t, rate):
+        return np.sin(rate * t)[:, None, None] * shape
+
+    return effect(
+        (ROWS, COLUMNS),
+        90.0,
+        drive=lambda t: 0.2 * wide(t, 700),
         signal=lambda t: 0.1 * np.sin(1300 * t),
-        on=lambda t: 1 + 0.2 * np.sin(300 * t)[:, None] * shape,
+        thresholds=lambda t: (1 + 0.2 * wide(t, 300), np.ones(t.size)),
         inject=inject,
     )
 
@@ -66,10 +70,10 @@ CASES = {
     "in lanes": IN_LANES,
     "cascade": CASCADE,
     "all": ALL,
-    "all and additions": {**ALL, "additions": additions()},
+    "all and more": {**ALL, "hooks": [added()]},
     "Euler": {**IN_LANES, "low_pass": LowPass(update="euler")},
-    "K steps and additions": {
-        **ALL, "low_pass": LowPass(update="first_order_hold"), "additions": additions()
+    "K steps and more": {
+        **ALL, "low_pass": LowPass(update="first_order_hold"), "hooks": [added()]
     },
 }  # fmt: skip
 
@@ -90,7 +94,7 @@ def run(pixel, light, K=10, printed=False, **options):
 @pytest.mark.thorough
 def test_tiles_chunks_and_threads_change_nothing(name, printed, monkeypatch):
     sections = dict(CASES[name])
-    light, same = clip(), {"printed": printed, "additions": sections.pop("additions", None)}
+    light, same = clip(), {"printed": printed, "hooks": sections.pop("hooks", ())}
     pixel = Pixel(**sections)
     whole = run(pixel, light, **same)
     assert len(whole) > 1000
@@ -148,24 +152,21 @@ def test_events_do_not_run_out_of_room():
 _PLAIN = """
 import numpy as np, sys
 sys.path[:0] = [{tests!r}, {tests!r} + "/kernel"]
-from harness import EVERYTHING, IN_LANES, STEPPED_FORM, advance, start
+from harness import EVERYTHING, IN_LANES, STEPPED_FORM, advance, effect, start
 from test_invariance import ALL, CASCADE
-from adv2e.effects.courses import Additions
 from adv2e.config.model import Pixel, LowPass
 draw = np.random.default_rng(2)
 light = np.exp(draw.uniform(1, 5.5, (3, 3, 4))).astype(np.float32)
 times = [0, 2_000_000, 4_000_000]
-added = Additions(
-    longest_step_us=lambda a, b: 100.0,
-    drive=lambda t: 0.1 * np.sin(900 * t),
-    on=lambda t: 1 + 9 * t,
+added = effect(
+    (3, 4), drive=lambda t: 0.1 * np.sin(900 * t), thresholds=lambda t: (1 + 9 * t, 1 + 0 * t)
 )
 paper = LowPass(update="paper")
-for sections, additions in (
-    ({{}}, None), (IN_LANES, None), (STEPPED_FORM, None), (CASCADE, None), (EVERYTHING, None),
-    (ALL, added), ({{**ALL, "low_pass": paper}}, added),
+for sections, hooks in (
+    ({{}}, ()), (IN_LANES, ()), (STEPPED_FORM, ()), (CASCADE, ()), (EVERYTHING, ()),
+    (ALL, [added]), ({{**ALL, "low_pass": paper}}, [added]),
 ):
-    array = start(light, times, Pixel(**sections), exact_times=True, additions=additions)
+    array = start(light, times, Pixel(**sections), exact_times=True, hooks=hooks)
     events, exact = advance(array, light, times)
     print(len(events), *(f"{{t:.4f}}" for t in exact), *events["p"], *events["x"], *events["y"])
 """

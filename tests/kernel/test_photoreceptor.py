@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from differences import STEP_S, Truth
 from harness import EVERYTHING, advance, quiet, solve, start
 from reference.agreement import count_and_time_errors
+from reference.differences import STEP_S, Truth
 from scipy import interpolate, linalg
 
 from adv2e.causes import LEAK, PHOTORECEPTOR_NOISE
@@ -20,7 +20,7 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
-from adv2e.effects.courses import LONGEST_US
+from adv2e.effects.hooks import LONGEST_US
 from adv2e.kernel import per_pixel, rng
 from adv2e.kernel.cascade.plan import plan_for
 from adv2e.kernel.photoreceptor import law

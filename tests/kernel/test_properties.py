@@ -1,8 +1,8 @@
 """What must hold of any stimulus."""
 
 import numpy as np
-from harness import QUIET, advance, by_pixel, quiet, solve, start
-from hypothesis import example, given, settings
+from harness import QUIET, advance, by_pixel, effect, quiet, solve, start
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adv2e.config.model import (
@@ -14,7 +14,6 @@ from adv2e.config.model import (
     SlewLimit,
     Thresholds,
 )
-from adv2e.effects.courses import Additions
 from adv2e.kernel import per_pixel
 
 LIGHTS = st.lists(st.floats(0.0, 255.0, width=32), min_size=2, max_size=8)
@@ -111,33 +110,13 @@ def test_whatever_the_light_events_are_in_order_and_apart(light, fraction, slew,
         assert np.all(np.diff(t) >= (dead_us or 0.0) - 1e-6)
 
 
-@settings(max_examples=60, deadline=None)
-@given(light=MANY, slew=st.floats(5.0, 200.0), threshold=st.floats(0.05, 0.5))
-@example(  # ends its ramp within a step, just before an event
-    light=[[255.0, 0, 0], [71.0, 0, 0], [208.0, 0, 0], [8.0, 0, 0]], slew=90.0, threshold=0.19140625
-)
-def test_slew_limit_keeps_events_apart(light, slew, threshold):
-    """No two events of one polarity are nearer than the limit allows, but for 1 us."""
-    times = np.arange(len(light)) * 0.01
-    pixel = quiet(
-        slew_limit=SlewLimit(per_s=slew),
-        thresholds=Thresholds(on=threshold, off=threshold, mismatch=0.0),
-    )
-    for events in solve(np.array(light), times, pixel):
-        passed = threshold * np.cumsum(events[:, 1])
-        assert np.all(np.abs(passed) <= slew * (events[:, 0] + 1e-6))
-        gaps, moved = np.diff(events[:, 0]), np.abs(np.diff(passed))
-        same = events[1:, 1] == events[:-1, 1]
-        assert np.all(moved[same] <= slew * (gaps[same] + 1e-6))
-
-
 @settings(max_examples=40, deadline=None)
 @given(light=MANY, offset=st.floats(-3.0, 3.0))
 def test_a_constant_added_to_the_signal_changes_nothing(light, offset):
     times = np.arange(len(light)) * 0.01
-    added = Additions(longest_step_us=lambda a, b: 1e3, signal=lambda t: np.full(t.shape, offset))
+    added = effect((1, 3), 1e3, signal=lambda t: np.full(t.shape, offset))
     plain = solve(np.array(light), times, quiet(), method="stepped")
-    found = solve(np.array(light), times, quiet(), additions=added)
+    found = solve(np.array(light), times, quiet(), hooks=[added])
     for a, b in zip(found, plain, strict=True):
         assert np.array_equal(a[:, 1], b[:, 1])
         # where the signal hardly moves, rounding shows

@@ -8,18 +8,14 @@ import math
 
 import numpy as np
 import pytest
-from camera.helpers import seen, still
-from differences import STEP_S, Truth
-from harness import advance, by_pixel, quiet, solve, start
+from harness import advance, by_pixel, clock, effect, moving_light, quiet, solve, start
 from reference.agreement import count_and_time_errors
-from reference.circuit import Circuit
-from test_twin import check, clock, moving_light
+from reference.differences import STEP_S, Truth
 
 from adv2e.config.model import (
     HotPixels,
     Leak,
     LogResponse,
-    LowPass,
     PhotoreceptorNoise,
     Refractory,
     Sampling,
@@ -27,45 +23,10 @@ from adv2e.config.model import (
     SourceFollower,
     Thresholds,
 )
-from adv2e.effects.courses import Additions
 from adv2e.errors import UsageError
 from adv2e.kernel import rng
 from adv2e.pixel.array import make_circuit
 from adv2e.pixel.steps import steps_of
-
-
-@pytest.mark.parametrize("update", ["first_order_hold", "zero_order_hold", "euler", "paper"])
-@pytest.mark.parametrize("printed", [False, True])
-@pytest.mark.parametrize("follower_hz", [None, 300.0])
-def test_stepped_forms_against_the_twin(update, printed, follower_hz):
-    light = moving_light(31, 12, seed=3)
-    pixel = quiet(
-        low_pass=LowPass(update=update),
-        refractory=Refractory(period_us=700),
-        leak=Leak(rate_hz=10.0, jitter=0.0),
-        source_follower=SourceFollower(cutoff_hz=follower_hz) if follower_hz else None,
-    )
-    circuit = Circuit(
-        update=update,
-        K=5,
-        L=10,
-        printed_last_interval=printed,
-        dead_time_us=700.0,
-        leak_hz=10.0,
-        follower_hz=follower_hz,
-    )
-    options = {"K": 5, "L": 10, "printed": printed, "method": "stepped", "within_us": 0.01}
-    check(light, clock(31, 1 / 240), pixel, circuit, **options)
-
-
-@pytest.mark.parametrize("update", ["first_order_hold", "paper"])
-def test_leak_of_the_stepped_forms_follows_the_light(update):
-    """As if at the mean light of a step; the twin's is a line within it, which costs some us."""
-    light = moving_light(31, 24, seed=3)
-    pixel = quiet(low_pass=LowPass(update=update), leak=Leak(photo_rate_hz=40.0, jitter=0.0))
-    circuit = Circuit(update=update, K=5, leak_hz=0.1, photo_leak_hz=40.0)
-    check(light, clock(31, 1 / 240), pixel, circuit, K=5, within_us=10.0)
-
 
 NOISY = {
     "dead time": Refractory(period_us=800.0),
@@ -135,31 +96,6 @@ def test_photoreceptor_noise_moves_the_signal(follower_hz):
     assert found.max_dt_us < 0.5
 
 
-@pytest.mark.parametrize("method", ["auto", "stepped"])
-@pytest.mark.parametrize("follower_hz", [None, 300.0])
-@pytest.mark.quick_cases(1)
-def test_photoreceptor_noise_makes_as_many_events_as_the_camera_has(follower_hz, method):
-    follower = {"cutoff_hz": follower_hz} if follower_hz else None
-    dead = {"period_us": 500.0}
-    given = {
-        "photoreceptor_noise": {"rms": 0.08},
-        "source_follower": follower,
-        "refractory": dead,
-    }
-    stream = seen(still(60.0), hidden={"pixel": given}, size=(25, 20), duration_s=0.3, step_us=50.0)
-    pixel = quiet(
-        log_response=LogResponse(linear_below=0),
-        low_pass=LowPass(dark_cutoff_hz=20.0),
-        photoreceptor_noise=PhotoreceptorNoise(rms=0.08),
-        source_follower=SourceFollower(**follower) if follower else None,
-        refractory=Refractory(**dead),
-    )
-    light, times = np.full((4, 500), 60.0), np.arange(4) * 0.1
-    events = sum(map(len, solve(light, times, pixel, seed=1, method=method)))
-    assert events > 3000
-    assert events == pytest.approx(len(stream.time), rel=0.06)
-
-
 def test_normals_are_normal_and_independent():
     drawn = np.empty((500, 4, 64))
     for block, four in enumerate(drawn):
@@ -211,14 +147,14 @@ def test_method_is_one_of_two():
         start(np.ones((2, 3)), [0, 1], quiet(), method="fast")
 
 
-def test_additions_of_nothing_change_nothing():
+def test_an_effect_that_adds_nothing_changes_nothing():
     light, times = moving_light(9, 40, seed=2), clock(9, 1 / 240)
     times_ns = [round(t * 1e9) for t in times]
     arrays = [
         start(light, times_ns, quiet(), exact_times=True, **options)
         for options in (
             {"method": "stepped"},
-            {"additions": Additions(longest_step_us=lambda a, b: math.inf)},
+            {"hooks": [effect((1, 40), math.inf, signal=lambda t: None)]},
         )
     ]
     one, two = (by_pixel(array, *advance(array, light, times_ns)) for array in arrays)

@@ -1,13 +1,9 @@
 """The compiled pixel against the slow twin, which shares no code with it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from harness import first_draws, quiet, solve
-from reference.agreement import count_and_time_errors
+from harness import check_against_twin, clock, moving_light, quiet
 from reference.circuit import Circuit, Draws, merge_injected
-from reference.twin import simulate_twin
 
 from adv2e.config.model import (
     HotPixels,
@@ -20,45 +16,6 @@ from adv2e.config.model import (
     Thresholds,
 )
 from adv2e.kernel import rng
-
-
-def moving_light(knots, pixels, seed=0, step=0.3):
-    """Return light that wanders, rests, returns to old values, and crosses the knee both ways."""
-    draw = np.random.default_rng(seed)
-    walk = np.exp(np.cumsum(draw.normal(0, step, (knots, pixels)), 0) + np.log(50))
-    walk = np.clip(walk, 0.3, 255)
-    walk[3:5, : pixels // 4] = walk[2, : pixels // 4]
-    walk[-2:, pixels // 4 : pixels // 2] = walk[0, pixels // 4 : pixels // 2]
-    walk[1, -1], walk[2, -1] = 3.0, 250.0
-    return walk.astype(np.float32).astype(np.float64)
-
-
-def check(
-    light, times, pixel, circuit, draws=None, within_us=0.3, step_us=4.0, in_steps=False, **options
-):
-    """Compare the kernel with the twin; `in_steps`: the solver in steps of time, too."""
-    draws = draws or Draws()
-
-    def begin(array):
-        nonlocal draws
-        first = first_draws(array, draws.leak_factors)
-        draws = replace(first, injected=draws.injected)
-
-    kernel = solve(light, times, pixel, begin=begin, **options)
-    twin = simulate_twin(light, times, circuit, draws, step_us=step_us)
-    solved = [(kernel, within_us)]
-    if in_steps:
-        solved.append((solve(light, times, pixel, method="stepped", **options), 1.0))
-    for events, within in solved:
-        found = count_and_time_errors(events, twin)
-        assert found.count_b > 50
-        assert not found.differing
-        assert found.max_dt_us < within
-
-
-def clock(knots, interval_s):
-    return np.round(np.arange(knots) * interval_s * 1e9) * 1e-9
-
 
 CASES = {
     "lin-log": ({}, {}),
@@ -112,16 +69,8 @@ CASES = {
 def test_exact_and_in_steps_of_time(name, interval_s):
     sections, circuit = CASES[name]
     light = moving_light(14, 32, seed=len(name))
-    check(light, clock(14, interval_s), quiet(**sections), Circuit(**circuit), in_steps=True)
-
-
-@pytest.mark.parametrize("update", ["first_order_hold", "zero_order_hold", "euler", "paper"])
-def test_stepped_forms_behind_a_second_pole_from_rest(update):
-    """The paper's form moves at rest, too: its weights do not sum to one."""
-    light = np.repeat(moving_light(8, 12, seed=3), 4, axis=0)
-    pixel = quiet(low_pass=LowPass(update=update), source_follower=SourceFollower(cutoff_hz=100))
-    circuit = Circuit(update=update, K=3, follower_hz=100.0)
-    check(light, clock(32, 1 / 240), pixel, circuit, K=3, within_us=0.01)
+    times = clock(14, interval_s)
+    check_against_twin(light, times, quiet(**sections), Circuit(**circuit), in_steps=True)
 
 
 @pytest.mark.parametrize("L", [1, 10])
@@ -129,7 +78,7 @@ def test_stepped_forms_behind_a_second_pole_from_rest(update):
 def test_exact_with_the_printed_last_interval(L):
     light = moving_light(21, 8, seed=4, step=0.1)
     circuit = Circuit(K=4, L=L, printed_last_interval=True)
-    check(light, clock(21, 1 / 240), quiet(), circuit, K=4, L=L, printed=True)
+    check_against_twin(light, clock(21, 1 / 240), quiet(), circuit, K=4, L=L, printed=True)
 
 
 def shot_candidates(pixel, rate_hz, seed, end_s):
@@ -187,4 +136,4 @@ def test_noise_events_and_leak_jitter(first, dead_time, jitter):
     ]
     draws = Draws(injected=merge_injected(shot, hot), leak_factors=factors)
     circuit = Circuit(dead_time_us=dead_time, leak_hz=20.0, photo_leak_hz=10.0)
-    check(light, times, pixel, circuit, draws, seed=seed)
+    check_against_twin(light, times, pixel, circuit, draws, seed=seed)

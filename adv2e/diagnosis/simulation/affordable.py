@@ -14,7 +14,7 @@ import numpy as np
 from adv2e.config import Config
 from adv2e.config.active_effects import active_hooks
 from adv2e.diagnosis.data.evidence import Evidence, check_events
-from adv2e.effects.composition import additions_of, begin
+from adv2e.effects.composition import begin, inside_pixel, longest_step_us
 from adv2e.kernel.circuit import EXACT
 from adv2e.light.interpolation.linear import instant_ns
 from adv2e.pixel.circuit import driver_of, make_circuit
@@ -98,8 +98,8 @@ def affordable(evidence: Evidence, declared: Config) -> Evidence:
 def steps_of_time(evidence: Evidence, declared: Config) -> int:
     """Return the number of time steps of a pixel through a recording; 0: it is solved exactly."""
     shown, hooks = evidence.simulated, active_hooks(declared)
-    additions, circuit = additions_of(hooks), make_circuit(declared.pixel, declared.sampling, 0)
-    if driver_of(declared.pixel, circuit, additions, "auto") != "run_stepped":
+    inside, circuit = inside_pixel(hooks), make_circuit(declared.pixel, declared.sampling, 0)
+    if driver_of(declared.pixel, circuit, inside, "auto") != "run_stepped":
         return 0
     frames = zip(shown.times_ns, shown.lights(declared), strict=True)
     # one at a time: all of them may be many
@@ -110,11 +110,9 @@ def steps_of_time(evidence: Evidence, declared: Config) -> int:
     for (begin_ns, dim), (end_ns, lit) in pairwise(seen):
         instants = (instant_ns(begin_ns, end_ns, k, count) for k in range(count + 1))
         for start_ns, stop_ns in pairwise(instants):
-            limit, length_us = np.inf, 1e-3 * (stop_ns - start_ns)
-            if additions is not None:
-                limit = additions.longest_step_us(start_ns * 1e-9, stop_ns * 1e-9)
-            steps = 1
+            length_us, steps = 1e-3 * (stop_ns - start_ns), 1
             if is_exact:
+                limit = longest_step_us(inside, start_ns * 1e-9, stop_ns * 1e-9)
                 steps = steps_of(length_us / pieces, circuit, limit, max(dim, lit), FINE)
             total += pieces * steps
     return total

@@ -50,7 +50,7 @@ from adv2e.diagnosis.tables.threshold_noise import (
     SAMPLING_SHIFT,
     event_rates,
 )
-from adv2e.effects.courses import LONGEST_US
+from adv2e.effects.hooks import LONGEST_US
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
 from adv2e.effects.pixel.thresholds import FLOOR
 

@@ -8,6 +8,8 @@ events at its own rate, drawn once:
 so that rate_hz is the median over the hot pixels, and their mean is 10^(1.15 spread^2) times that.
 In a camera such rates lie decades apart [1].
 
+Compiled in adv2e/kernel/noise.py.
+
 References
 ----------
 [1] D. Joubert et al., "Event camera simulator improvements via characterized parameters", Frontiers

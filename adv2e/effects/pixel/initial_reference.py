@@ -13,6 +13,8 @@ random      The scene moved before, as in a piece of a longer recording.  Each p
 x is the log intensity of the first frame; C_on and C_off are the pixel's own thresholds.  The
 choice shows in the first events of each pixel, and in the phases of its leak.
 
+Compiled in adv2e/kernel/per_pixel.py (random) and adv2e/kernel/leak.py (running).
+
 References
 ----------
 [1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal

@@ -31,6 +31,8 @@ Long cycles are met more often than they begin.  The reference lies (a - d)/T of
 the signal.  Beside photoreceptor noise of standard deviation sigma and corner w, cycles end early,
 at the rate w z exp(-z^2/2) / sqrt(2 pi) at z sigma below the threshold (Kramers) [3, 4].
 
+Compiled in adv2e/kernel/leak.py.
+
 References
 ----------
 [1] Y. Nozaki, T. Delbruck, "Temperature and parasitic photocurrent effects in dynamic vision

@@ -12,6 +12,8 @@ steeper just below the knee than just above it.  DN are linear light: on video t
 sRGB, 20 DN is code 80 of 255, and a third of a usual picture would lie on the foot, with up to
 three times the contrast.  The default is therefore e.
 
+Compiled in adv2e/kernel/exact.py and adv2e/kernel/stepped/signal.py.
+
 References
 ----------
 [1] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events", CVPR Workshops

@@ -20,6 +20,8 @@ paper               y <- exp(-a) y + a x1, as ADV2E prints it.  Its gain at rest
                     a/(1 - exp(-a)), not 1, so it makes events of its own where the brightness
                     changes.
 
+Compiled in adv2e/kernel/quadrature.py (exact) and adv2e/kernel/stepped/signal.py.
+
 References
 ----------
 [1] X. Jiang, F. Zhou, J. Lin, "ADV2E: Bridging the Gap Between Analogue Circuit and Discrete Frames

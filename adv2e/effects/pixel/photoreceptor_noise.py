@@ -22,6 +22,8 @@ Then it is not sampled: it is drawn as finely as events need it.  Its variance i
 so that noise falls as the light rises.  That is what two cameras do
 (adv2e/diagnosis/tables/README.md); behind the low-pass alone, rates rise with the corner.
 
+Compiled in adv2e/kernel/photoreceptor/ and adv2e/kernel/stepped/signal.py.
+
 References
 ----------
 [1] R. Graca, T. Delbruck, "Unraveling the paradox of intensity-dependent DVS pixel noise",

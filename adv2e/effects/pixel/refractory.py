@@ -5,6 +5,9 @@ that moment, as the reset switch of the real pixel opens then.  With refractory:
 dead time: the reference moves by the threshold at a signal event and to the signal at a noise
 event.
 
+Compiled in adv2e/kernel/lanes/apply_events.py, adv2e/kernel/cascade/substep.py and
+adv2e/kernel/stepped/events.py.
+
 References
 ----------
 [1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal

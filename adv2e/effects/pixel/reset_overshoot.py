@@ -12,6 +12,8 @@ Without dead time the reference moves by p C_p (1 + eps) at a signal event.  Aft
 one of the same polarity needs (1 + eps) of the threshold, one of the other polarity (1 - eps),
 whatever the speed of the change.  Every event resets, those of noise too.
 
+Compiled in adv2e/kernel/cascade/substep.py and adv2e/kernel/stepped/events.py.
+
 References
 ----------
 [1] M. Yang, S.-C. Liu, T. Delbruck, "A dynamic vision sensor with 1 % temporal contrast sensitivity

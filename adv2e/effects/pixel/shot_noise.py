@@ -13,6 +13,8 @@ The fall is that within one image.  From scene to scene, noise falls with the li
 sensor [3] had 12 Hz at 0.1 lux (ON 6.9, OFF 5.2) and twice 0.004 Hz at 161 lux (OFF; most ON events
 were leak).  The default is for good light.  A scene in dim light needs 1 to 10 Hz.
 
+Compiled in adv2e/kernel/noise.py.
+
 References
 ----------
 [1] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events", CVPR Workshops

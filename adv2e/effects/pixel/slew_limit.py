@@ -8,6 +8,8 @@ s           per_s: what its bias current can charge the load with
 The pole follows its equation as long as that asks for less.  Beyond, its output is a ramp.  Large
 steps of the light are then late, by more the larger they are; small steps are not.
 
+Compiled in adv2e/kernel/stepped/signal.py.
+
 References
 ----------
 [1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal

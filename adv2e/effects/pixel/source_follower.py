@@ -9,6 +9,8 @@ f_s         cutoff_hz
 With low_pass.update: exact, y is a cubic in each step of time; with the forms of K steps it is a
 straight line.  For either, the second pole is solved exactly.
 
+Compiled in adv2e/kernel/cascade/ and adv2e/kernel/stepped/signal.py.
+
 References
 ----------
 [1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal

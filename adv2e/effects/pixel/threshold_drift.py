@@ -8,6 +8,8 @@ t           time since the first frame
 
 The leak keeps its speed, which the thresholds at the start set.
 
+Applied in adv2e/pixel/steps.py.
+
 References
 ----------
 [1] Y. Nozaki, T. Delbruck, "Temperature and parasitic photocurrent effects in dynamic vision

@@ -10,6 +10,8 @@ sigma       mismatch
 
 ON and OFF are drawn independently of each other.
 
+Compiled in adv2e/kernel/per_pixel.py.
+
 References
 ----------
 [1] P. Lichtsteiner, C. Posch, T. Delbruck, "A 128x128 120 dB 15 us latency asynchronous temporal

@@ -1,12 +1,14 @@
-"""Achieved rates of noise equal the requested ones within their own sampling error."""
+"""Leak: rates, phases and gaps of pixels at rest, from the first moment on."""
+
+from __future__ import annotations
 
 import numpy as np
 import pytest
-from harness import advance, quiet, start
+from harness import PIXELS, SECONDS, at_rest, check_against_twin, clock, moving_light, quiet, start
+from reference.circuit import Circuit
 from scipy import stats
 
 from adv2e.config.model import (
-    HotPixels,
     Leak,
     LowPass,
     PhotoreceptorNoise,
@@ -20,60 +22,13 @@ from adv2e.config.model import (
 from adv2e.diagnosis.tables.noise import NoisySources, noise_rates
 from adv2e.kernel import per_pixel
 
-PIXELS = 3000
-SECONDS = 4.0
-
-
-def still(dn, pixel, seconds=SECONDS, pixels=PIXELS, frames=5, seed=3):
-    light = np.full((frames, 1, pixels), dn, np.float32)
-    times = [round(k * seconds / (frames - 1) * 1e9) for k in range(frames)]
-    array = start(light, times, pixel, seed=seed, exact_times=True)
-    return advance(array, light, times)
-
-
-def within(count, expected, sigmas=4.0):
-    return abs(count - expected) <= sigmas * np.sqrt(expected)
-
-
-@pytest.mark.parametrize("dn", [0.0, 40.0, 255.0])
-def test_shot_noise(dn):
-    pixel = quiet(shot_noise=ShotNoise(rate_hz=3.0), initial_reference="random")
-    events, _ = still(dn, pixel)
-    assert within(len(events), PIXELS * SECONDS * 3.0 * (1 - 0.75 * dn / 255))
-    assert within(events["p"].sum(), len(events) / 2)
-    times = np.sort(events["t"]) / 1e6
-    assert stats.kstest(times, stats.uniform(0, SECONDS).cdf).pvalue > 1e-3
-
-
-def test_shot_noise_loses_what_falls_into_dead_time():
-    pixel = quiet(
-        shot_noise=ShotNoise(rate_hz=100.0),
-        refractory=Refractory(period_us=2000.0),
-        initial_reference="random",
-    )
-    events, exact = still(0.0, pixel, seconds=2.0, pixels=300)
-    assert within(len(events), 300 * 2.0 * 100 / (1 + 100 * 2e-3))
-    for x in range(20):
-        assert np.diff(np.sort(exact[events["x"] == x])).min() >= 2000.0
-
-
-def test_rates_of_hot_pixels_are_spread_over_decades():
-    hot = HotPixels(fraction=0.5, rate_hz=100.0, spread=0.6)
-    events, _ = still(0.0, quiet(hot_pixels=hot))
-    rates = np.bincount(events["x"], minlength=PIXELS) / SECONDS
-    logs = np.log10(rates[rates > 0])
-    assert events["p"].all()
-    assert within(logs.size, PIXELS * 0.5)
-    deviations = stats.kstest(logs, stats.norm(2.0, 0.6).cdf).statistic
-    assert deviations < 2.0 / np.sqrt(logs.size)
-
 
 @pytest.mark.parametrize(("dn", "photo"), [(0.0, 0.0), (128.0, 1.5), (255.0, 1.5)])
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
 def test_leak(dn, photo, jitter):
     rate = 2.0 + photo * dn / 255
     leak = Leak(rate_hz=2.0, photo_rate_hz=photo, jitter=jitter)
-    events, exact = still(dn, quiet(leak=leak, initial_reference="random"))
+    events, exact = at_rest(dn, quiet(leak=leak, initial_reference="random"))
     assert events["p"].all()
     # a pixel fires regularly, at a phase that is uniform over both thresholds: only the first
     # event may take up to twice a period
@@ -123,7 +78,7 @@ def test_leak_goes_on_from_the_first_moment_as_later(circuit, jitter, noise_hz):
     if sections["refractory"] is None:
         dead_s = 0.0
     dn, seconds, bins = 85.0, 1.0, 8
-    events, exact = still(dn, quiet(**sections), seconds)
+    events, exact = at_rest(dn, quiet(**sections), seconds)
     sources = NoisySources(leak_hz=1.0, photo_leak_hz=6.0, shot_hz=noise_hz, dead_time_s=dead_s)
     rates = noise_rates(sources, np.array([dn / 255]))
     on, off = per_second(events, seconds, bins)
@@ -141,7 +96,7 @@ def test_leak_goes_on_from_the_first_moment_as_later(circuit, jitter, noise_hz):
 def test_a_camera_that_leaks_keeps_what_leak_promises(sections):
     """Of 3000 pixels at rest some 300 events a second, and never all pixels at once."""
     pixel = Pixel(leak=Leak(), **sections)
-    events, _ = still(128.0, pixel, 40.0)
+    events, _ = at_rest(128.0, pixel, 40.0)
     shot = pixel.shot_noise.rate_hz if pixel.shot_noise else 0.0
     sources = NoisySources(leak_hz=0.1, shot_hz=shot, dead_time_s=5e-4)
     rates = noise_rates(sources, np.array([128 / 255]))
@@ -171,7 +126,7 @@ def test_what_has_come_before_is_drawn_pixel_by_pixel():
 @pytest.mark.parametrize("overshoot", [-0.4, 0.4])
 def test_leak_before_the_recording_knows_the_overshoot_of_the_reset(overshoot):
     sections = {"reset_overshoot": ResetOvershoot(fraction=overshoot), **RUNNING}
-    events, _ = still(80.0, quiet(leak=Leak(rate_hz=5.0), **sections), 1.0)
+    events, _ = at_rest(80.0, quiet(leak=Leak(rate_hz=5.0), **sections), 1.0)
     expected = 1 / (5e-4 + (1 + overshoot) / 5.0)
     on, _ = per_second(events, 1.0)
     assert np.abs(on - expected).max() < 4 * np.sqrt(expected * 8 / PIXELS)
@@ -181,79 +136,15 @@ def test_leak_before_the_recording_leaves_room_for_photoreceptor_noise():
     """Noise takes pixels over the last of their way: those beyond it must not fire at once."""
     noise = PhotoreceptorNoise(rms=0.03)
     pixel = quiet(leak=Leak(rate_hz=2.0), photoreceptor_noise=noise, **RUNNING)
-    events, _ = still(128.0, pixel, 0.5, pixels=600)
+    events, _ = at_rest(128.0, pixel, 0.5, pixels=600)
     first = np.count_nonzero(events["t"] < 20_000)
     assert first < 2 * len(events) * 0.04
 
 
-def test_hot_pixels():
-    pixel = quiet(hot_pixels=HotPixels(fraction=0.1, rate_hz=20.0), initial_reference="random")
-    events, _ = still(90.0, pixel)
-    hot = np.unique(events["x"])
-    assert within(hot.size, 0.1 * PIXELS)
-    assert within(len(events), hot.size * SECONDS * 20.0)
-    assert events["p"].all()
-
-
-def test_random_reference_is_uniform_between_the_thresholds():
-    pixel = quiet(initial_reference="random")
-    light = np.full((2, 1, PIXELS), 100, np.float32)
-    array = start(light, [0], pixel)
-    offset = (
-        array.state[per_pixel.X] - array.state[per_pixel.REFERENCE]
-    ) / 0.2  # signal minus reference
-    assert stats.kstest(offset, stats.uniform(-1, 2).cdf).pvalue > 1e-3
-
-
-def test_photoreceptor_noise_has_its_rms_and_correlation():
-    """Sampled from the state at the ends of intervals, at two brightnesses."""
-    interval_ns = 500_000
-    for dn in (20.0, 255.0):
-        pixel = quiet(photoreceptor_noise=PhotoreceptorNoise(rms=0.05))
-        light = np.full((2, 1, 2000), dn, np.float32)
-        array = start(light, [0], pixel)
-        samples = []
-        for k in range(30):
-            advance(array, light, [k * interval_ns, (k + 1) * interval_ns])
-            samples.append(array.state[per_pixel.NOISE].copy())
-        noise = np.array(samples)
-        assert noise.std() == pytest.approx(0.05, rel=0.03)
-        corner = 2e-9 * np.pi * (21.8 + 278.2 * dn / 255)
-        lagged = np.mean(noise[1:] * noise[:-1]) / np.mean(noise**2)
-        assert lagged == pytest.approx(np.exp(-corner * interval_ns), abs=0.02)
-
-
-def test_photoreceptor_noise_alternates():
-    pixel = quiet(photoreceptor_noise=PhotoreceptorNoise(rms=0.08), initial_reference="random")
-    events, _ = still(128.0, pixel, seconds=0.3, pixels=200)
-    pairs = opposite = 0
-    for x in range(200):
-        p = events["p"][events["x"] == x].astype(int)
-        pairs += len(p) - 1 if len(p) else 0
-        opposite += np.count_nonzero(np.diff(p))
-    assert pairs > 500
-    assert opposite / pairs > 0.75
-
-
-def test_noise_behind_a_second_pole_begins_as_it_goes_on():
-    """Its variance, and what it has in common with that before the pole, as theory has them."""
-    rms, follower_hz = 0.1, 60.0
-    dn = np.repeat([10.0, 200.0], 4000)
-    light = np.tile(dn, (3, 1)).astype(np.float32)
-    times = [0, 30_000_000, 60_000_000]
-    pixel = quiet(
-        thresholds=Thresholds(on=9.0, off=9.0, mismatch=0.0),
-        source_follower=SourceFollower(cutoff_hz=follower_hz),
-        photoreceptor_noise=PhotoreceptorNoise(rms=rms, step=0.3),
-    )
-    array = start(light, times, pixel)
-    share = follower_hz / (follower_hz + 21.8 + (300.0 - 21.8) * dn / 255.0)
-    for _ in range(2):
-        noise, seen = array.state[per_pixel.NOISE], array.state[per_pixel.SEEN]
-        for half in (slice(0, 4000), slice(4000, 8000)):
-            expected = rms**2 * share[half][0]
-            # five standard errors
-            assert np.var(seen[half]) == pytest.approx(expected, rel=0.12)
-            both = np.mean(seen[half] * noise[half])
-            assert both == pytest.approx(expected, rel=0.12 / np.sqrt(share[half][0]))
-        advance(array, light, times)
+@pytest.mark.parametrize("update", ["first_order_hold", "paper"])
+def test_leak_of_the_stepped_forms_follows_the_light(update):
+    """As if at the mean light of a step; the twin's is a line within it, which costs some us."""
+    light = moving_light(31, 24, seed=3)
+    pixel = quiet(low_pass=LowPass(update=update), leak=Leak(photo_rate_hz=40.0, jitter=0.0))
+    circuit = Circuit(update=update, K=5, leak_hz=0.1, photo_leak_hz=40.0)
+    check_against_twin(light, clock(31, 1 / 240), pixel, circuit, K=5, within_us=10.0)

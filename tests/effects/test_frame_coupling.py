@@ -1,4 +1,4 @@
-"""Equations of the effects of the readout, by hand and beside the brute-force camera."""
+"""Frame coupling: the disturbance by hand, beside the brute-force camera, and in events."""
 
 from __future__ import annotations
 
@@ -7,149 +7,14 @@ import math
 import numpy as np
 import pytest
 from camera.photoreceptor import frame_coupling
-from camera.readout import Stream
-from camera.readout import arbiter as camera_arbiter
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from reference.agreement import count_and_time_errors, split_events
 
 from adv2e import load_config, simulate
 from adv2e.conversion.simulation import events_from_light
 from adv2e.effects.hooks import Hooks, View
-from adv2e.effects.pixel.dead_pixels import DeadPixels, DeadPixelsHooks
-from adv2e.effects.readout.arbiter import Arbiter, ArbiterHooks
-from adv2e.effects.readout.event_loss import EventLoss, EventLossHooks
 from adv2e.effects.readout.frame_coupling import FrameCoupling, FrameCouplingHooks
-from adv2e.effects.readout.timestamp_tick import TimestampTickHooks, ticked
-from adv2e.events import make_events, sort_events
-from adv2e.kernel import rng
 from adv2e.light import intervals
 from adv2e.pixel.steps import steps_of
-
-ROWS, COLUMNS = 12, 10
-
-
-def out_of(hook, events, cuts=(), start_s=0.0, seed=0):
-    """Return the events that come out of `hook`, `events` cut into chunks."""
-    hook.begin(View(ROWS, COLUMNS, seed, start_s))
-    parts = list(hook.events(iter(np.split(events, list(cuts)))))
-    return np.concatenate(parts) if parts else events[:0]
-
-
-def bursts(seed, count=4000, span_us=20_000):
-    """Return sorted events, many at the same time and in the same row."""
-    draws = np.random.default_rng(seed)
-    t = np.sort(draws.choice(draws.integers(0, span_us, count // 4), count))
-    columns = draws.integers(0, COLUMNS, count), draws.integers(0, ROWS, count)
-    return sort_events(make_events(t, *columns, draws.integers(0, 2, count)))
-
-
-@pytest.mark.parametrize(("event_ns", "row_ns"), [(500, 3000), (3000, 0), (0, 20000), (2000, 9000)])
-@pytest.mark.parametrize("start_s", [0.0, 1_468_941_032.0])
-def test_arbiter_is_that_of_the_camera(event_ns, row_ns, start_s):
-    events = bursts(3)
-    shifted = events.copy()
-    shifted["t"] += round(start_s * 1e6)
-    found = out_of(
-        ArbiterHooks(Arbiter(event_ns=event_ns, row_ns=row_ns)), shifted, (7, 900, 2500), start_s
-    )
-    pixels = events["y"].astype(np.int64) * COLUMNS + events["x"]
-    within = rng.next_uniforms(0, rng.REQUEST, pixels, np.zeros(ROWS * COLUMNS, np.int64))
-    # in microseconds: what comes at the same time as a latch must not hang on rounding
-    stream = Stream(
-        events["t"] + (within - 0.5), pixels, np.where(events["p"], 1, -1).astype(np.int64)
-    ).in_order()
-    wanted = camera_arbiter(stream, COLUMNS, event_ns * 1e-3, row_ns * 1e-3)
-    y, x = np.divmod(wanted.pixel, COLUMNS)
-    stamps = np.rint(wanted.time) + round(start_s * 1e6)
-    again = sort_events(make_events(stamps, x, y, wanted.polarity > 0))
-    assert len(again) < len(events)
-    assert found.tobytes() == again.tobytes()
-
-
-def test_arbiter_serves_the_row_that_waited_longest_from_left_to_right():
-    # row 5 asks first and is selected at 10 us; what asks until then goes with it
-    events = make_events([0, 2, 9, 11], [7, 1, 3, 0], [5, 2, 5, 5], [1, 1, 0, 1])
-    found = out_of(ArbiterHooks(Arbiter(event_ns=1000.0, row_ns=10_000.0)), events)
-    # 3 and 7 of row 5 leave at 11 and 12 us, row 2 at 23 us, the rest of row 5 at 34 us
-    assert found["t"].tolist() == [11, 12, 23, 34]
-    assert found["x"].tolist() == [3, 7, 1, 0]
-    assert found["y"].tolist() == [5, 5, 2, 5]
-    assert found["p"].tolist() == [0, 1, 1, 1]
-
-
-def test_a_pixel_that_waits_cannot_ask_again():
-    events = make_events([0, 1, 10, 12], [4] * 4, [4] * 4, [1, 0, 0, 1])
-    found = out_of(ArbiterHooks(Arbiter(event_ns=1000.0, row_ns=10_000.0)), events)
-    assert found["t"].tolist() == [11, 23]
-    assert found["p"].tolist() == [1, 1]
-
-
-def test_what_leaves_the_arbiter_is_not_rounded_twice():
-    # one event a millisecond, so that none waits for another
-    t = 1000 * np.arange(1, 4001)
-    events = make_events(t, t // 1000 % COLUMNS, t // 1000 % ROWS, np.ones(t.size))
-    found = out_of(ArbiterHooks(Arbiter(event_ns=500.0, row_ns=4000.0)), events)
-    waited = found["t"] - t
-    assert set(waited.tolist()) == {4, 5}
-    assert np.mean(waited == 4) == pytest.approx(0.5, abs=0.04)
-
-
-def test_rows_that_ask_the_arbiter_together_are_served_in_any_order():
-    t = np.repeat(1000 * np.arange(1, 2001), 2)
-    events = make_events(t, np.full(t.size, 3), np.tile([2, 7], 2000), np.ones(t.size))
-    found = out_of(ArbiterHooks(Arbiter(event_ns=1000.0, row_ns=10_000.0)), events)
-    first = found["y"][::2]
-    assert np.mean(first == 2) == pytest.approx(0.5, abs=0.06)
-
-
-@settings(max_examples=25, deadline=None)
-@given(st.integers(0, 1000), st.lists(st.integers(0, 300), max_size=6))
-def test_arbiter_does_not_depend_on_chunks(seed, cuts):
-    events = bursts(seed, 300, 900)
-    hook = ArbiterHooks(Arbiter(event_ns=700.0, row_ns=2500.0))
-    whole = out_of(hook, events)
-    assert out_of(hook, events, sorted(cuts)).tobytes() == whole.tobytes()
-    assert whole.tobytes() == sort_events(whole).tobytes()
-
-
-@settings(max_examples=25, deadline=None)
-@given(st.integers(0, 1000), st.lists(st.integers(0, 300), max_size=6), st.floats(0.3, 40.0))
-def test_ticks_do_not_depend_on_chunks_and_are_never_early(seed, cuts, tick_us):
-    events = bursts(seed, 300, 900)
-    whole = out_of(TimestampTickHooks(tick_us), events)
-    assert out_of(TimestampTickHooks(tick_us), events, sorted(cuts)).tobytes() == whole.tobytes()
-    assert whole.tobytes() == sort_events(whole).tobytes()
-    late = ticked(events["t"], tick_us) - events["t"]
-    assert late.min() >= -0.5
-    assert late.max() < tick_us + 0.5
-
-
-def test_ticks_by_hand():
-    times = np.array([0, 1, 249, 250, 251, 1001], np.int64)
-    assert ticked(times, 250.0).tolist() == [0, 250, 250, 250, 500, 1250]
-    assert ticked(times, 62.5).tolist() == [0, 62, 250, 250, 312, 1062]
-
-
-def test_loss_takes_its_share_and_draws_by_pixel():
-    events = bursts(1, 40_000, 2_000_000)
-    hook = EventLossHooks(EventLoss(fraction=0.25))
-    kept = out_of(hook, events)
-    assert len(kept) / len(events) == pytest.approx(0.75, abs=0.01)
-    assert out_of(hook, events, (1, 5000, 5001)).tobytes() == kept.tobytes()
-    assert out_of(hook, events, seed=1).tobytes() != kept.tobytes()
-    one = events[events["x"] == 3]
-    assert out_of(hook, one).tobytes() == kept[kept["x"] == 3].tobytes()
-    assert len(out_of(EventLossHooks(EventLoss(fraction=1.0)), events)) == 0
-
-
-def test_dead_pixels_are_silent_and_the_others_as_they_were():
-    events = bursts(2, 20_000, 100_000)
-    found = out_of(DeadPixelsHooks(DeadPixels(fraction=0.3)), events)
-    pixels = events["y"].astype(int) * COLUMNS + events["x"]
-    left = np.unique(found["y"].astype(int) * COLUMNS + found["x"])
-    assert 0.5 < len(left) / (ROWS * COLUMNS) < 0.9
-    assert found.tobytes() == events[np.isin(pixels, left)].tobytes()
 
 
 def test_coupling_is_that_of_the_camera_after_its_rise_and_never_before_a_readout():
@@ -391,12 +256,3 @@ def test_where_the_coupling_has_decayed_long_steps_make_the_same_events(monkeypa
     )
     assert not agreement.differing
     assert agreement.mean_dt_us < 0.1
-
-
-@pytest.mark.parametrize("cuts", [(), (1,), (2, 3)])
-def test_a_coarse_clock_leaves_the_events_of_a_pixel_in_their_order(cuts):
-    events = make_events([1, 20, 300, 400, 700], [5, 5, 5, 2, 5], [1, 1, 1, 1, 1], [1, 0, 1, 1, 0])
-    found = out_of(TimestampTickHooks(1000.0), events, cuts)
-    assert found["t"].tolist() == [1000] * 5
-    assert found["x"].tolist() == [2, 5, 5, 5, 5]
-    assert found["p"][1:].tolist() == [1, 0, 1, 0]

@@ -1,11 +1,34 @@
 """The pixel by plain differences in steps of 1 us; it shares no code with the package."""
 
 import numpy as np
+
+from reference.agreement import count_and_time_errors
 from reference.circuit import Circuit
 from reference.twin import log_of
 
 STEP_S = 1e-6
 PURE = Circuit(linear_below=0.0)
+
+
+_DRAW = np.random.default_rng(5)
+_WALK = np.log(50) + np.cumsum(_DRAW.normal(0, 0.35, (11, 20)), 0)
+
+LIGHT = np.exp(np.clip(_WALK, 0.0, np.log(255))).astype(np.float32).astype(np.float64)
+"""Light of 20 pixels that wanders, at 11 `TIMES` [DN]."""
+
+TIMES = np.arange(11) * 0.004
+"""[s]"""
+
+
+def check(found, truth, *, least=60):
+    """Compare events with those of the truth: nearly all pixels, and every time within 1 us."""
+    agreement = count_and_time_errors(found, truth)
+    assert agreement.count_b > least
+    assert len(agreement.differing) <= len(truth) // 20
+    times = [abs(a[:, 0] - b[:, 0]) for a, b in zip(found, truth, strict=True) if len(a) == len(b)]
+    apart = 1e6 * np.concatenate(times)
+    assert np.median(apart) < 0.2
+    assert apart.max() < 1.0
 
 
 class Truth:
