@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from adv2e.compiled import kernel
 
@@ -13,40 +16,50 @@ FREE, HEAD, ROWS, EVENTS = 0, 1, 2, 3
 """Entries of the record of a channel."""
 
 
+class Requests(NamedTuple):
+    """Events that ask for the channel, or that have passed it."""
+
+    time: NDArray[np.float64]  # (n,) [us]
+    pixel: NDArray[np.int64]  # (n,)
+    polarity: NDArray[np.int8]  # (n,)
+
+
+class Channel(NamedTuple):
+    """Channel, and who waits for it."""
+
+    record: NDArray[np.float64]  # (4,): FREE: from when on it is, HEAD: the first row of the queue,
+    # ROWS: how many wait, EVENTS: likewise
+    queue: NDArray[np.int64]  # (rows,): those that wait, in a ring, by their first requests
+    asked: NDArray[np.float64]  # (rows,): time of the first request, -infinity: the row waits not
+    waiting: NDArray[np.int8]  # (pixels,): polarity of the event that waits, or NOBODY
+    left: NDArray[np.float64]  # (pixels,): when its last event was read out
+
+
 @kernel
-def serve(
-    time, pixel, polarity, known, row_us, event_us, columns, channel, queue, asked, waiting, left,
-    out_time, out_pixel, out_polarity,
-):  # fmt: skip
+def serve(requests, known, row_us, event_us, columns, channel, served):
     """Take events in, and serve rows as long as all requests before their latch are known.
 
     Parameters
     ----------
-    time, pixel, polarity : (n,)
-        Events in order, times [us]; all of them are taken in.
+    requests : Requests
+        In order; all of them are taken in.
     known : float
         Time before which no further event will come [us].
-    channel : (4,)
-        Time from which the channel is free; first row of the queue, rows in it, events that wait.
-    queue : (rows,) int
-        Rows that wait, in a ring, in the order of their first requests.
-    asked : (rows,)
-        Time of the first request of each row that waits; below zero infinity: it does not.
-    waiting : (pixels,) int8
-        Polarity of the event that waits, or -1.
-    left : (pixels,)
-        Time at which the last event of each pixel was read out.
+    served : Requests
+        Those that have passed, in that order.
 
     Returns
     -------
     int
-        Events written to the outputs.
+        How many these are.
     """
+    time, pixel, polarity = requests
+    record, queue, asked, waiting, left = channel
     rows = queue.shape[0]
     arrived = np.int64(0)
     count = time.shape[0]
-    head, length = np.int64(channel[HEAD]), np.int64(channel[ROWS])
-    free, pending = channel[FREE], channel[EVENTS]
+    head, length = np.int64(record[HEAD]), np.int64(record[ROWS])
+    free, pending = record[FREE], record[EVENTS]
     written = np.int64(0)
     while arrived < count or length > 0:
         if length == 0 and time[arrived] <= left[pixel[arrived]]:
@@ -77,12 +90,12 @@ def serve(
             if waiting[place] != NOBODY:
                 free += event_us
                 left[place] = free
-                out_time[written] = free
-                out_pixel[written] = place
-                out_polarity[written] = waiting[place]
+                served.time[written] = free
+                served.pixel[written] = place
+                served.polarity[written] = waiting[place]
                 waiting[place] = NOBODY
                 pending -= 1.0
                 written += 1
-    channel[FREE], channel[HEAD], channel[ROWS] = free, head, length
-    channel[EVENTS] = pending
+    record[FREE], record[HEAD], record[ROWS] = free, head, length
+    record[EVENTS] = pending
     return int(written)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adv2e.causes import CAUSE_BITS
 from adv2e.compiled import kernel
@@ -12,28 +14,25 @@ from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.leak import begin_leak_cycle
 from adv2e.kernel.packing import PIXEL_BITS
 
-# ---- Arrays of events that grow while compiled code fills them.
+
+class EventBuffer(NamedTuple):
+    """Memory for events, which grows while compiled code fills it."""
+
+    keys: NDArray[np.int64]  # (n,): packed events
+    times: NDArray[np.float64]  # (n,): their unrounded times [us]; (0,) where they are not kept
+    t_base: int  # from which packed times count [us]
 
 
 @kernel
-def with_room(keys, times, used, needed):
-    """Return the two arrays of events, longer where they cannot hold `needed`.
-
-    Parameters
-    ----------
-    keys : (n,) int64
-        Packed events.
-    times : (n,) float64
-        Their unrounded times [us]; (0,) where they are not kept.
-    used, needed : int
-        Entries that are filled, and that there must be.
-    """
+def with_room(buffer, used, needed):
+    """Return the buffer, longer where it cannot hold `needed` events; `used` of it are filled."""
+    keys, times = buffer.keys, buffer.times
     if needed > keys.shape[0]:
         entries = 2 * keys.shape[0] + needed
         if times.shape[0] > 0:
             times = _grown(times, used, entries)
         keys = _grown(keys, used, entries)
-    return keys, times
+    return EventBuffer(keys, times, buffer.t_base)
 
 
 @kernel
@@ -53,16 +52,17 @@ without ever arriving; rounding alone would decide whether it fires.
 
 
 @kernel
-def fire(i, t, polarity, cause, t_base, circuit, state, keys, times, n):
+def fire(i, t, polarity, cause, circuit, state, buffer, n):
     """Write an event of pixel i at t us, with which a leak cycle begins; returns their number.
 
     Past the end of the buffer it is only counted.
     """
-    state, keys, times = borrowed(state, keys, times)
+    state, buffer = borrowed(state, buffer)
+    keys, times = buffer.keys, buffer.times
     if circuit.leak_jitter > 0.0:
         begin_leak_cycle(i, circuit, state)
     if n < keys.shape[0]:
-        stamp = math.floor(t + 0.5) - t_base
+        stamp = math.floor(t + 0.5) - buffer.t_base
         key = (stamp << (PIXEL_BITS + 1)) | (i << 1) | (1 if polarity > 0 else 0)
         keys[n] = (key << CAUSE_BITS) | cause if circuit.causes else key
         if n < times.shape[0]:

@@ -19,35 +19,41 @@ from adv2e.kernel.cascade import advance as cascade
 from adv2e.kernel.cascade import screen as cascade_screen
 from adv2e.kernel.circuit import EXACT, Circuit
 from adv2e.kernel.comparator import with_room
-from adv2e.kernel.frames import load
+from adv2e.kernel.frames import Interval, load
 from adv2e.kernel.lanes import batch, exchange, rows
+from adv2e.kernel.leak import leak_strip, leaks, lower_references
 from adv2e.kernel.photoreceptor import strip as photoreceptor
 from adv2e.kernel.quadrature import Rule
-from adv2e.kernel.strip_leak import leak_strip, leaks, lower_references
 from adv2e.kernel.work_queue import STRIP, claim
 
 _f = np.float32
 _BLOCK = 256
 
 
-class Scratch(NamedTuple):
-    """Memory of whoever works on a tile."""
+class StripMemory(NamedTuple):
+    """Memory for the pixels of a strip."""
 
-    strip: NDArray[np.float32]  # of the screen
+    rows: NDArray[np.float32]  # of the screens
     lanes: NDArray[np.float64]
-    pixels: NDArray[np.int64]  # numbers of the lanes' pixels
-    falls: NDArray[np.float64]
-    means: NDArray[np.float64]
-    cascade: cascade.Scratch
+    pixels: NDArray[np.int64]  # numbers of those that may fire
+    falls: NDArray[np.float64]  # of the reference over the interval
+    means: NDArray[np.float64]  # of the light there [DN]
 
 
-def scratch() -> Scratch:
+class ExactMemory(NamedTuple):
+    """Memory of whoever works on a strip."""
+
+    strip: StripMemory
+    cascade: cascade.CascadeMemory
+
+
+def new_memory() -> ExactMemory:
     """Return fresh memory."""
     pixels = np.zeros(STRIP + rows.WIDTH, np.int64)
-    falls, means = np.zeros(STRIP), np.zeros(STRIP)
-    return Scratch(
-        cascade_screen.scratch(), rows.scratch(), pixels, falls, means, cascade.scratch()
+    strip = StripMemory(
+        cascade_screen.new_rows(), rows.new_rows(), pixels, np.zeros(STRIP), np.zeros(STRIP)
     )
+    return ExactMemory(strip, cascade.new_memory())
 
 
 def covers(circuit: Circuit) -> bool:
@@ -67,8 +73,9 @@ def _alike(a, b):
 
 
 @kernel
-def _rests(frames, f, before, share, first, count):
+def _rests(schedule, f, first, count):
     """Tell whether the grey values of a strip are those of the instant before."""
+    frames, before, share = schedule.frames, schedule.before, schedule.share
     if not frames.coded or share[f] != _f(1.0) or share[f + 1] != _f(1.0):
         return False
     if before[f + 1] != before[f] + 1:
@@ -134,45 +141,33 @@ def _screen(strip, end, length, circuit, rule):
 
 
 @kernel
-def _solve_flagged(
-    lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
-):  # fmt: skip
-    """Solve the m pixels whose numbers are in scratch.pixels, in lanes."""
-    strip, pixels, lanes = scratch.strip, scratch.pixels, scratch.lanes
-    waiting = exchange.held_first(m, strip, pixels)
-    exchange.load(lo, m, ta, length, circuit, state, strip, scratch.falls, pixels, lanes)
+def _solve_flagged(lo, m, interval, circuit, rule, state, memory, buffer, n):
+    """Solve the m pixels whose numbers are in memory.pixels, in lanes."""
+    waiting = exchange.held_first(m, memory.rows, memory.pixels)
+    exchange.load(lo, m, interval, circuit, state, memory)
     while True:
-        keys, times = with_room(keys, times, n, n + 2 * m)
-        m, n = batch.decide(
-            lo, m, waiting, start, ta, length, t_base, circuit, rule, state, strip, pixels, lanes,
-            keys, times, n,
-        )  # fmt: skip
+        buffer = with_room(buffer, n, n + 2 * m)
+        m, n = batch.decide(lo, m, waiting, interval, circuit, rule, state, memory, buffer, n)
         if m == 0:
-            return n, keys, times
-        n, waiting = batch.search(
-            lo, m, ta, length, t_base, circuit, rule, state, pixels, lanes, keys, times, n
-        )
+            return n, buffer
+        n, waiting = batch.search(lo, m, interval, circuit, rule, state, memory, buffer, n)
 
 
 @kernel
-def _advance_strip(
-    lo, count, start, ta, length, circuit, rule, t_base, state, scratch, keys, times, n
-):  # fmt: skip
+def _advance_strip(lo, count, interval, circuit, rule, state, memory, buffer, n):
     """Advance one strip over one interval, whose light is in LIGHT_0 and LIGHT_1."""
-    strip, falls = scratch.strip, scratch.falls
+    strip, length = memory.rows, interval.length
     has_leak = leaks(circuit)
     if has_leak:
-        leak_strip(lo, count, length, circuit, state, strip, falls, scratch.means)
-    _screen(strip, _f(ta + length - start), length, circuit, rule)
-    m = screen.flagged(strip, scratch.pixels)
+        leak_strip(lo, count, length, circuit, state, memory)
+    _screen(strip, _f(interval.start + length - interval.origin), length, circuit, rule)
+    m = screen.flagged(strip, memory.pixels)
     if m > 0:
-        n, keys, times = _solve_flagged(
-            lo, m, start, ta, length, t_base, circuit, rule, state, scratch, keys, times, n
-        )
+        n, buffer = _solve_flagged(lo, m, interval, circuit, rule, state, memory, buffer, n)
     if has_leak:
-        lower_references(lo, count, state, strip, falls)
+        lower_references(lo, count, state, memory)
     screen.step_on(strip)
-    return n, keys, times
+    return n, buffer
 
 
 @kernel
@@ -186,92 +181,70 @@ def _rule(rules, f):
 
 
 @kernel
-def _rest_strip(
-    lo, count, first, last, starts, circuit, t_base, state, scratch, keys, times, n
-):  # fmt: skip
-    """Advance one strip over the intervals first..last: no light changes, no lag is left."""
-    # numbers of one type from the start: a function is compiled anew for a constant
-    none = np.int64(0)
-    b, f, j, m, s = none, first, none, none, 0.0
-    while b < count:
-        n, b, f, j, m, s = static_pixels.go_through(
-            lo, count, b, f, j, m, s, first, last, starts, circuit, t_base, state, scratch.strip,
-            scratch.falls, scratch.means, scratch.pixels, keys, times, n,
-        )  # fmt: skip
-        if b < count:
-            keys, times = with_room(keys, times, n, n + 1)
-    return n, keys, times
-
-
-@kernel
-def _strip(
-    lo, count, frames, before, share, starts, circuit, rules, plan, t_base,
-    state, scratch, keys, times, n,
-):  # fmt: skip
+def _strip(lo, count, schedule, circuit, rules, plan, state, memory, buffer, n):
     """Advance one strip of the exact circuit over all intervals."""
-    frames, before, share, starts = borrowed(frames, before, share, starts)
-    rules, state, scratch = borrowed(rules, state, scratch)
+    schedule, rules, state, memory = borrowed(schedule, rules, state, memory)
+    frames, before, share, starts = (
+        schedule.frames, schedule.before, schedule.share, schedule.starts,
+    )  # fmt: skip
     # what rests for long is gone through in closed form, where only leak and noise can fire
     may_rest = True
     if plan is not None:
         may_rest = plan.simple and not circuit.causes
-    strip = scratch.strip
+    own = memory.strip
+    strip = own.rows
     light = strip[screen.LIGHT_1 : screen.LIGHT_1 + count]
     floor = 0.0 if circuit.slope > 0.0 else circuit.floor
     start = starts[0]
     load(frames, before[0], share[0], lo, floor, light)
-    _open_strip(lo, count, start, circuit, state, strip, scratch.cascade.noise)
+    _open_strip(lo, count, start, circuit, state, strip, memory.cascade.noise)
     number = np.int64(state[per_pixel.NOISE_DRAW, lo])
     has_leak = leaks(circuit)
     intervals = starts.shape[0] - 1
     settled, resting = cascade_screen.is_settled(strip), False
     f = np.int64(0)
     while f < intervals:
-        still = _rests(frames, f, before, share, lo, count)
+        still = _rests(schedule, f, lo, count)
         if not still:
             load(frames, before[f + 1], share[f + 1], lo, floor, light)
             still = screen.is_still(strip)
         if still and settled and may_rest:
             if not resting:
                 if has_leak:
-                    leak_strip(lo, count, 1.0, circuit, state, strip, scratch.falls, scratch.means)
+                    leak_strip(lo, count, 1.0, circuit, state, own)
                 static_pixels.begin_rest(_f(starts[f] - start), strip)
                 resting = True
             last = f + 1
-            while last < intervals and _rests(frames, last, before, share, lo, count):
+            while last < intervals and _rests(schedule, last, lo, count):
                 last += 1
-            n, keys, times = _rest_strip(
-                lo, count, f, last, starts, circuit, t_base, state, scratch, keys, times, n
+            n, buffer = static_pixels.go_through(
+                lo, count, f, last, starts, circuit, state, own, buffer, n
             )
             f = last
             continue
         if resting and has_leak:
             static_pixels.end_rest(lo, count, circuit, state, strip)
         resting = False
-        ta, length = starts[f], starts[f + 1] - starts[f]
+        interval = Interval(f, start, starts[f], starts[f + 1] - starts[f])
         # of None the compiler knows that it is none: it compiles one of the two
         if plan is None:
-            n, keys, times = _advance_strip(
-                lo, count, start, ta, length, circuit, _rule(rules, f), t_base, state, scratch,
-                keys, times, n,
-            )  # fmt: skip
+            n, buffer = _advance_strip(
+                lo, count, interval, circuit, _rule(rules, f), state, own, buffer, n
+            )
         else:
-            n, keys, times = cascade.advance(
-                lo, count, start, ta, length, f, number, still and settled, circuit, plan, t_base,
-                state, scratch, keys, times, n,
+            n, buffer = cascade.advance(
+                lo, count, interval, number, still and settled, circuit, plan, state, memory,
+                buffer, n,
             )  # fmt: skip
             number += plan.pieces[plan.cut[f]]
         settled = still and (settled or cascade_screen.is_settled(strip))
         f += 1
-    _close_strip(lo, count, number, circuit, state, strip, scratch.cascade.noise)
-    return n, keys, times
+    _close_strip(lo, count, number, circuit, state, strip, memory.cascade.noise)
+    return n, buffer
 
 
 @kernel
-def run_exact(
-    claimed, most, frames, before, share, starts, begins, last, circuit, rules, plan, t_base,
-    state, scratch, keys, times,
-):  # fmt: skip
+def run_exact(claimed, most, schedule, circuit, rules, plan, state, memory, buffer):
     """Advance strips that nobody else works on over the intervals between neighbouring frames.
 
     Parameters
@@ -280,35 +253,21 @@ def run_exact(
         See :mod:`adv2e.kernel.work_queue`.
     most : int
         Strips after which to return, though there may be more.
-    frames : Frames
-    before, share : (intervals + 1[ + 1],)
-        The light at the start and at the end of each interval is `share` of the way from frame
-        `before` to the next; with the printed last interval one more follows, for the look-ahead.
-    starts : (intervals + 1,)
-        Ends of the intervals since the start of the recording [us], the first being their start.
-    begins : bool
-        Whether the recording begins here.
-    last : (intervals + 1,)
-        With the paper's last interval as printed: which intervals are the last of an input
-        interval (the final entry looks ahead); else all False.
+    schedule : Schedule
     rules : Rules
         Quadrature for each interval.
     plan : Plan or None
         How each interval is cut for the cascade; None where lanes do.
-    keys, times : (n,)
-        Memory for events; see :mod:`adv2e.kernel.comparator`.
+    buffer : EventBuffer
 
     Returns
     -------
-    events written, keys, times
+    events written, buffer
     """
     n = np.int64(0)
     for _ in range(most):
         lo, hi = claim(claimed, state.shape[1])
         if lo == hi:
             break
-        n, keys, times = _strip(
-            lo, hi - lo, frames, before, share, starts, circuit, rules, plan, t_base,
-            state, scratch, keys, times, n,
-        )  # fmt: skip
-    return n, keys, times
+        n, buffer = _strip(lo, hi - lo, schedule, circuit, rules, plan, state, memory, buffer, n)
+    return n, buffer

@@ -1,4 +1,4 @@
-"""Frames as compiled code takes them, and the light of a strip of pixels."""
+"""Frames and intervals as compiled code takes them, and the light of a strip of pixels."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from adv2e.compiled import kernel
 _f = np.float32
 
 
-class Frames(NamedTuple):
+class FrameStack(NamedTuple):
     """Frames of all pixels: light, or grey values with the table that decodes them."""
 
     light: NDArray[np.float32]  # (frames, pixels) [DN]
@@ -22,14 +22,38 @@ class Frames(NamedTuple):
     plain: bool  # whether the light is the grey value itself
 
 
-def frames_of(frames: NDArray[Any], table: NDArray[np.float32] | None) -> Frames:
+class Schedule(NamedTuple):
+    """Frames, and the intervals that a call advances over."""
+
+    frames: FrameStack
+    before: NDArray[np.int64]  # the light at each end of the intervals is `share` of the way from
+    share: NDArray[np.float32]  # frame `before` to the next; one more looks ahead, where printed
+    starts: NDArray[np.float64]  # (intervals + 1,): ends, since the recording's start [us]
+    begins: bool  # whether the recording begins here
+    # (intervals + 1,), with the paper's last interval as printed: which of them are the last of an
+    # input interval (the final entry looks ahead); else all False
+    last: NDArray[np.bool_]
+
+
+class Interval(NamedTuple):
+    """One of the intervals [us]."""
+
+    f: int  # its number in the call
+    origin: float  # start of the call, from which due times count
+    start: float
+    length: float
+
+
+def frames_of(frames: NDArray[Any], table: NDArray[np.float32] | None) -> FrameStack:
     """Return (frames, rows, columns) of light, or of uint8 grey values with their table."""
     flat = frames.reshape(frames.shape[0], -1)
     if table is None:
         light = np.ascontiguousarray(flat, np.float32)
-        return Frames(light, np.empty((1, 1), np.uint8), np.empty(256, np.float32), False, False)
+        return FrameStack(
+            light, np.empty((1, 1), np.uint8), np.empty(256, np.float32), False, False
+        )
     plain = bool(np.array_equal(table, np.arange(256)))
-    return Frames(np.empty((1, 1), np.float32), np.ascontiguousarray(flat), table, True, plain)
+    return FrameStack(np.empty((1, 1), np.float32), np.ascontiguousarray(flat), table, True, plain)
 
 
 @kernel

@@ -7,16 +7,40 @@ from __future__ import annotations
 
 import math
 
-from adv2e.compiled import kernel
-from adv2e.kernel import per_pixel, rng
+import numpy as np
+
+from adv2e.compiled import inlined, kernel
+from adv2e.kernel import per_pixel, rng, screen, special
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.noise import hot_rate_of
+from adv2e.kernel.work_queue import STRIP
+
+_f = np.float32
 
 _MOST = 3.0
 """Largest deviation of a period, in standard deviations."""
 
 _TRIES = 100
 """Ages that are drawn for a pixel; none of them is left only where noise leaves leak no time."""
+
+
+@inlined
+def leak_rate(light, circuit):
+    """Speed at which leak lowers the reference in `light` [DN], in ON thresholds a us."""
+    return circuit.leak + circuit.photo_leak * light
+
+
+@inlined
+def fall_over(on, length, mean, circuit):
+    """Fall of the reference over `length` us [ln units]; `on`: ON threshold, `mean`: light [DN].
+
+    Parts of leak are added up here, where :func:`leak_over` has them over the time for all pixels:
+    the two do not round alike.
+    """
+    fall = on * circuit.leak * length
+    if circuit.photo_leak > 0.0:
+        fall += on * circuit.photo_leak * mean * length
+    return fall
 
 
 @kernel
@@ -40,6 +64,43 @@ def fill_falls(lo, count, length, mean, circuit, state, falls):
         factor = state[per_pixel.LEAK_FACTOR, lo : lo + count]
         for k in range(count):
             falls[k] *= factor[k]
+
+
+@kernel
+def leaks(circuit):
+    """Tell whether there is any leak."""
+    return circuit.leak > 0.0 or circuit.photo_leak > 0.0
+
+
+@kernel
+def _mean_lights(strip, knee_dn, means):
+    """Mean light of each pixel over the interval [DN]."""
+    for k in range(STRIP):
+        i0, i1 = strip[screen.LIGHT_0 + k], strip[screen.LIGHT_1 + k]
+        dx = special.log_ratio32((i1 - i0) / (i1 + i0 + _f(1e-30)))
+        grown = i1 * (_f(1.0) - dx * special.psi32(-dx))
+        means[k] = grown if min(i0, i1) >= knee_dn else _f(0.5) * (i0 + i1)
+
+
+@kernel
+def leak_strip(lo, count, length, circuit, state, memory):
+    """Fall of the reference of a strip over `length` us, with the light of the screen's rows."""
+    strip, falls, means = memory.rows, memory.falls, memory.means
+    if circuit.photo_leak > 0.0:
+        _mean_lights(strip, _f(circuit.slope * circuit.knee), means)
+    fill_falls(lo, count, length, means, circuit, state, falls)
+    for k in range(count):
+        strip[screen.FALL + k] = falls[k]
+
+
+@kernel
+def lower_references(lo, count, state, memory):
+    """Take the fall from the references of the pixels that are done."""
+    strip, falls = memory.rows, memory.falls
+    reference = state[per_pixel.REFERENCE, lo : lo + count]
+    for k in range(count):
+        fall = falls[k] if strip[screen.HIT + k] == 0.0 else 0.0
+        reference[k] -= fall
 
 
 @kernel
@@ -97,7 +158,7 @@ def fill_running(lo, hi, circuit, start, light, level, state):
     """
     seed, jitter, dead = circuit.seed, circuit.leak_jitter, circuit.dead_time
     for i in range(lo, hi):
-        rate = circuit.leak + circuit.photo_leak * light[i]
+        rate = leak_rate(light[i], circuit)
         factor = _factor(seed, jitter, i, 0) if jitter > 0.0 else 1.0
         way = level[i] + circuit.overshoot
         fallen, hold = 0.0, -1.0

@@ -1,7 +1,7 @@
 r"""The first pass of the exact circuit: all pixels of a strip over one interval.
 
 It moves every pixel to the end of the interval and tells which of them may fire on the way; only
-those are looked at again.  All of it is single precision and free of branches, one flat scratch
+those are looked at again.  All of it is single precision and free of branches, one flat
 array with rows at constant offsets, so that it compiles to vector instructions throughout.
 
 End value.  With s = 0..1 over the interval, v = 1 - s and u = y - x,
@@ -100,7 +100,7 @@ _LARGEST = (_ONE, _f(np.tanh(0.5 * LARGEST_STEP)))
 _LARGEST_LIGHT = _f(LARGEST_LIGHT)
 
 
-def scratch() -> NDArray[np.float32]:
+def new_rows() -> NDArray[np.float32]:
     """Return the flat array of rows of one strip; padding beyond its pixels must be harmless."""
     strip = np.zeros(SIZE, np.float32)
     strip[LIGHT_0 : LIGHT_0 + STRIDE] = 1.0

@@ -14,10 +14,12 @@ import numpy as np
 from adv2e.causes import SIGNAL
 from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, screen
+from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.causes import cause_by_leak, note_reset
-from adv2e.kernel.comparator import TIE, fire
+from adv2e.kernel.comparator import TIE, fire, with_room
+from adv2e.kernel.frames import Interval
 from adv2e.kernel.lanes.exchange import EARLY, log_of, watch
-from adv2e.kernel.leak import fill_falls
+from adv2e.kernel.leak import fill_falls, leaks
 from adv2e.kernel.noise import NONE, next_noise, noise_within, take_noise
 from adv2e.kernel.work_queue import STRIP
 
@@ -78,9 +80,10 @@ def end_rest(lo, count, circuit, state, strip):
 
 
 @kernel
-def fall_of_block(i, b, size, length, circuit, state, falls, means):
+def _fall_of_block(i, b, size, length, circuit, state, memory):
     """Fall of the references of a block, which begins at pixel b of its strip, i of all."""
-    fill_falls(i, size, length, means[b : b + size], circuit, state, falls[b : b + size])
+    means, falls = memory.means[b : b + size], memory.falls[b : b + size]
+    fill_falls(i, size, length, means, circuit, state, falls)
 
 
 @kernel
@@ -136,21 +139,21 @@ def _go_on(b, m, end, strip, index):
 
 
 @kernel
-def _solve(
-    k, i, s, start, ta, length, t_base, circuit, state, strip, falls, means, keys, times, n
-):  # fmt: skip
+def _solve(k, i, s, interval, circuit, state, memory, buffer, n):
     """Events of one pixel, number k of its strip and i of all, over an interval at rest.
 
     Returns the number of events and DONE, or, where there is no room left for them, the place from
     which to go on.  Leaves the pixel's rows of the screen as they are at the end of the interval.
     """
+    strip, falls = memory.rows, memory.falls
+    ta, length = interval.start, interval.length
     light = np.float64(strip[screen.LIGHT_1 + k])
     x, fall = log_of(light, circuit), falls[k]
     on, off = state[per_pixel.ON, i] + TIE, state[per_pixel.OFF, i] + TIE
     reference = state[per_pixel.REFERENCE, i]
     noise = next_noise(i, circuit, state)[1]
     while True:
-        if n == keys.shape[0]:
+        if n == buffer.keys.shape[0]:
             state[per_pixel.REFERENCE, i] = reference
             return n, s
         hold = state[per_pixel.HOLD, i]
@@ -186,11 +189,11 @@ def _solve(
                 continue
             level = away + fall * s
         when = ta + s * length
-        n = fire(i, when, polarity, cause, t_base, circuit, state, keys, times, n)
+        n = fire(i, when, polarity, cause, circuit, state, buffer, n)
         if circuit.leak_jitter > 0.0:
-            fall_of_block(i, k, 1, 1.0, circuit, state, falls, means)
+            _fall_of_block(i, k, 1, 1.0, circuit, state, memory)
             strip[screen.FALL + k] = falls[k]
-            fall_of_block(i, k, 1, length, circuit, state, falls, means)
+            _fall_of_block(i, k, 1, length, circuit, state, memory)
             reference += (falls[k] - fall) * s
             fall = falls[k]
         if circuit.dead_time > 0.0:
@@ -200,25 +203,20 @@ def _solve(
         note_reset(i, reference - fall * s, circuit, state)
     state[per_pixel.REFERENCE, i] = reference - fall
     strip[screen.LAG_1 + k] = 0.0
-    watch(k, i, x, start, circuit, state, strip)
+    watch(k, i, x, interval.origin, circuit, state, strip)
     return n, DONE
 
 
 @kernel
-def _solve_block(
-    lo, j, m, s, start, ta, length, t_base, circuit, state, strip, falls, means, index, keys,
-    times, n,
-):  # fmt: skip
+def _solve_block(lo, j, m, s, interval, circuit, state, memory, buffer, n):
     """Events of the flagged pixels, from the j-th of m on, which is solved from place s on.
 
     Returns the number of events, and j and s where it stopped: j = m, or there was no room left.
     """
+    (buffer,) = borrowed(buffer)
     while j < m:
-        k = index[j]
-        n, s = _solve(
-            k, lo + k, s, start, ta, length, t_base, circuit, state, strip, falls, means, keys,
-            times, n,
-        )  # fmt: skip
+        k = memory.pixels[j]
+        n, s = _solve(k, lo + k, s, interval, circuit, state, memory, buffer, n)
         if s != DONE:
             return n, j, s
         j, s = j + 1, 0.0
@@ -226,51 +224,33 @@ def _solve_block(
 
 
 @kernel
-def go_through(
-    lo, count, b, f, j, m, s, first, last, starts, circuit, t_base, state, strip, falls, means,
-    index, keys, times, n,
-):  # fmt: skip
-    """Advance a strip at rest over the intervals first..last, from where the last call stopped.
+def go_through(lo, count, first, last, starts, circuit, state, memory, buffer, n):
+    """Advance a strip at rest over the intervals first..last; returns number of events and buffer.
 
-    It stops where there is no room left for events.
-
-    Parameters
-    ----------
-    b, f, j, m, s
-        First pixel of the block, its interval, how many of its m flagged pixels are solved, and the
-        place from which to go on with the next one; 0, first, 0, 0, 0 at the start.
-
-    Returns
-    -------
-    number of events, b, f, j, m, s: b >= count at the end; else j < m
+    starts : (intervals + 1,) ends of all intervals [us]
     """
-    start, none = starts[0], np.int64(0)
-    leaks = circuit.leak > 0.0 or circuit.photo_leak > 0.0
-    while b < count:
-        i, size = lo + b, min(BLOCK, count - b)
-        if m == 0:
+    strip, pixels, origin, has_leak = memory.rows, memory.pixels, starts[0], leaks(circuit)
+    for b in range(0, count, BLOCK):
+        i, size, f = lo + b, min(BLOCK, count - b), first
+        while True:
             due = next_due(b, f, last, starts, strip)
-            if leaks:
+            if has_leak:
                 for c in range(f, due):
                     length = starts[c + 1] - starts[c]
-                    fall_of_block(i, b, size, length, circuit, state, falls, means)
-                    _lower_block(i, b, size, state, falls)
+                    _fall_of_block(i, b, size, length, circuit, state, memory)
+                    _lower_block(i, b, size, state, memory.falls)
             if due == last:
-                b, f = b + BLOCK, first
-                continue
-            f, j, s = due, none, 0.0
-        ta, length, end = starts[f], starts[f + 1] - starts[f], _f(starts[f + 1] - start)
-        if m == 0:
-            m = flag_block(b, size, end, strip, index)
-            if leaks:
-                fall_of_block(i, b, size, length, circuit, state, falls, means)
-                _lower_unflagged(i, b, size, state, strip, falls)
-        n, j, s = _solve_block(
-            lo, j, m, s, start, ta, length, t_base, circuit, state, strip, falls, means, index,
-            keys, times, n,
-        )  # fmt: skip
-        if j < m:
-            break
-        _go_on(b, m, end, strip, index)
-        f, m = f + 1, none
-    return n, b, f, j, m, s
+                break
+            f = due + 1
+            length, end = starts[f] - starts[due], _f(starts[f] - origin)
+            m = flag_block(b, size, end, strip, pixels)
+            if has_leak:
+                _fall_of_block(i, b, size, length, circuit, state, memory)
+                _lower_unflagged(i, b, size, state, strip, memory.falls)
+            interval = Interval(due, origin, starts[due], length)
+            j, s = np.int64(0), 0.0
+            while j < m:
+                buffer = with_room(buffer, n, n + 1)
+                n, j, s = _solve_block(lo, j, m, s, interval, circuit, state, memory, buffer, n)
+            _go_on(b, m, end, strip, pixels)
+    return n, buffer

@@ -49,7 +49,7 @@ class Part:
     times_ns : list of int
         Start, and end of each interval.
     last : (intervals + 1,) bool
-        See :func:`adv2e.kernel.exact.run_exact`.
+        See :class:`adv2e.kernel.frames.Schedule`.
     """
 
     frames: NDArray[Any]

@@ -23,7 +23,8 @@ from adv2e.kernel import exact
 from adv2e.kernel import packing as order
 from adv2e.kernel.cascade.plan import plan_for
 from adv2e.kernel.circuit import fastest_corner
-from adv2e.kernel.frames import Frames, frames_of
+from adv2e.kernel.comparator import EventBuffer
+from adv2e.kernel.frames import FrameStack, Schedule, frames_of
 from adv2e.kernel.packing import PIXEL_BITS, pack_limit_us
 from adv2e.kernel.photoreceptor.law import noise_of
 from adv2e.kernel.quadrature import rules_for
@@ -44,7 +45,7 @@ class _Worker:
     """Memory that one thread works with."""
 
     def __init__(self, stepped: bool, exact_times: bool) -> None:
-        self.scratch: Any = driver.scratch() if stepped else exact.scratch()
+        self.memory: Any = driver.new_memory() if stepped else exact.new_memory()
         self.keys = np.empty(4096, np.int64)
         self.times = np.empty(self.keys.size if exact_times else 0)
 
@@ -147,7 +148,7 @@ class PixelArray:
         """Return the sorted events of the intervals between neighbouring frames of light [DN].
 
         The first frame is the last of the call before; for the printed last interval one more
-        follows, to look ahead.  `last`: see :func:`adv2e.kernel.exact.run_exact`.
+        follows, to look ahead.  `last`: see :class:`adv2e.kernel.frames.Schedule`.
         """
         before = np.arange(-1, frames.shape[0] - 1)
         part = Part(frames, before, np.ones(before.size, np.float32), times_ns, last)
@@ -173,19 +174,17 @@ class PixelArray:
         frames = frames_of(part.frames, table)
         per_us = order.SLICES / (span + 2.0) / (1 << bits)
         parted: list[Parted] = []
+        schedule = Schedule(frames, part.before, part.share, starts, not self.started, part.last)
         for how in self._solutions(part, frames, starts):
-            arguments = (
-                frames, part.before, part.share, starts, not self.started, part.last, self.circuit,
-                *how, t_base, self.state,
-            )  # fmt: skip
-            parted += self._by_tiles(arguments, per_us, pool)
+            arguments = schedule, self.circuit, *how, self.state
+            parted += self._by_tiles(arguments, t_base, per_us, pool)
         self.started = True
         self._keep_times(parted)
         t0_us = self.origin_us + t_base
         yield from in_order(parted, self.columns, t0_us, pool, self.circuit.causes)
 
     def _solutions(
-        self, part: Part, frames: Frames, starts: NDArray[Any]
+        self, part: Part, frames: FrameStack, starts: NDArray[Any]
     ) -> Iterable[tuple[Any, ...]]:
         """Return the further arguments of the solver, for each call of it."""
         if self._stepping is not None:
@@ -201,8 +200,9 @@ class PixelArray:
         return [(rules_for(lengths[:0], fastest, 0.0), plan)]
 
     def _by_tiles(
-        self, arguments: tuple[Any, ...], per_us: float, pool: ThreadPoolExecutor | None
-    ) -> list[Parted]:
+        self, arguments: tuple[Any, ...], t_base: int, per_us: float,
+        pool: ThreadPoolExecutor | None,
+    ) -> list[Parted]:  # fmt: skip
         """Return the events of all tiles; each call finds its tile itself."""
         advance: Any = exact.run_exact if self._stepping is None else driver.run_stepped
         claimed = nothing_claimed()
@@ -210,9 +210,9 @@ class PixelArray:
         def run(_: int) -> Parted:
             worker = self._workers.get()
             try:
-                n, worker.keys, worker.times = advance(
-                    claimed, self._most, *arguments, worker.scratch, worker.keys, worker.times
-                )
+                buffer = EventBuffer(worker.keys, worker.times, t_base)
+                n, buffer = advance(claimed, self._most, *arguments, worker.memory, buffer)
+                worker.keys, worker.times = buffer.keys, buffer.times
                 return Parted(worker.keys, worker.times, n, per_us)
             finally:
                 self._workers.put(worker)

@@ -32,7 +32,7 @@ from adv2e.effects.composition import COURSES, course, injected, longest_step_us
 from adv2e.effects.hooks import LONGEST_US, Hooks
 from adv2e.effects.pixel.threshold_drift import drift_factors
 from adv2e.kernel.circuit import EXACT, Circuit, fastest_corner
-from adv2e.kernel.frames import Frames
+from adv2e.kernel.frames import FrameStack
 from adv2e.kernel.stepped.driver import BLOCK, Run
 from adv2e.kernel.stepped.events import Injected, injected_of
 from adv2e.light.intervals import Part
@@ -171,7 +171,9 @@ class Stepping:
         """Return the addition to the signal at the first frame, (1,) or (pixels,)."""
         return _at_first(self._course("signal", np.array([self._start])))
 
-    def runs(self, part: Part, frames: Frames, starts: NDArray[np.float64]) -> Iterator[_Planned]:
+    def runs(
+        self, part: Part, frames: FrameStack, starts: NDArray[np.float64]
+    ) -> Iterator[_Planned]:
         """Yield the runs over the intervals of a part, and the events that are injected in each.
 
         `starts` are the ends of the intervals since the origin [us].  Raises ConfigError where
@@ -244,7 +246,7 @@ class Stepping:
         return (times + self._origin) * 1e-6
 
 
-def _brightest(part: Part, frames: Frames, intervals: int) -> list[float]:
+def _brightest(part: Part, frames: FrameStack, intervals: int) -> list[float]:
     """Return the brightest light of each interval, of all frames that count there [DN]."""
     if frames.coded:
         return [float(frames.table.max())] * intervals

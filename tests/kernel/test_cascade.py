@@ -175,7 +175,7 @@ def test_curves_reach_zero_where_dense_samples_do():
     for _ in range(400):
         b = 10 ** draw.uniform(-1.0, 2.0)
         swing = draw.normal() * draw.integers(0, 2)
-        one = curve.Curve(*(draw.normal(size=6) * 0.4 ** np.arange(6)).tolist(), swing, b)
+        one = curve.SignalCurve(*(draw.normal(size=6) * 0.4 ** np.arange(6)).tolist(), swing, b)
         start_at, end = np.sort(draw.uniform(0, 1, 2)).tolist()
         values = sum(c * t**k for k, c in enumerate(one[:6])) + swing * np.exp(-b * t)
         inside = (t >= start_at) & (t <= end)

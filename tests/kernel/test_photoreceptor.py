@@ -66,7 +66,7 @@ def test_moments_are_those_of_the_equation(w, b, h):
 
 
 def tables(rms=0.05, follower_hz=300.0, length=4000.0, step=0.1, level=0.2, white=300.0):
-    noise = law.Noise(
+    noise = law.NoiseTerms(
         21.8 * RAD_US, white * RAD_US, follower_hz * RAD_US, rms,
         min(step / (white * RAD_US), LONGEST_US), level,
     )  # fmt: skip

@@ -72,7 +72,7 @@ CASES = [
 def fill(pixel, x0, x1, lag):
     """Return the circuit and the rows of one strip: thresholds and reference out of reach."""
     circuit = make_circuit(pixel, Sampling(), 0)
-    rows = screen.scratch()
+    rows = screen.new_rows()
     for row, values in (
         (screen.LIGHT_0, light(x0, circuit)),
         (screen.LIGHT_1, light(x1, circuit)),

@@ -28,14 +28,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adv2e.causes import has_causes, with_cause
 from adv2e.effects.hooks import Hooks, View
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.events import Events, make_events, pixels_of, sort_events
 from adv2e.kernel import rng
-from adv2e.kernel.arbiter import EVENTS, NOBODY, serve
+from adv2e.kernel.arbiter import EVENTS, NOBODY, Channel, Requests, serve
 from adv2e.parameters import Fit, Section, parameter
 
 LABELS = {
@@ -77,12 +76,15 @@ class ArbiterHooks(Hooks):
     def begin(self, view: View) -> None:
         """Empty the channel."""
         super().begin(view)
-        self._channel = np.array([-np.inf, 0.0, 0.0, 0.0])
-        self._queue = np.empty(view.rows, np.int64)
-        self._asked = np.full(view.rows, -np.inf)
-        self._waiting = np.full(view.rows * view.columns, NOBODY, np.int8)
-        self._left = np.full(view.rows * view.columns, -np.inf)
-        self._numbers = np.zeros(view.rows * view.columns, np.int64)
+        pixels = view.rows * view.columns
+        self._channel = Channel(
+            record=np.array([-np.inf, 0.0, 0.0, 0.0]),
+            queue=np.empty(view.rows, np.int64),
+            asked=np.full(view.rows, -np.inf),
+            waiting=np.full(pixels, NOBODY, np.int8),
+            left=np.full(pixels, -np.inf),
+        )
+        self._numbers = np.zeros(pixels, np.int64)
         # counted from the first frame: an epoch time would lose nanoseconds in rounding
         self._origin_us = round(view.start_s * 1e6)
 
@@ -102,28 +104,20 @@ class ArbiterHooks(Hooks):
 
     def _served(self, events: Events, known_us: float) -> Events:
         """Return the events that leave the channel before `known_us`, in that order."""
-        asking_us, pixel, what = self._requests(events)
-        most = events.size + int(self._channel[EVENTS])
-        times, pixels = np.empty(most), np.empty(most, np.int64)
-        served = np.empty(most, np.int8)
-        p = self.parameters
+        most = events.size + int(self._channel.record[EVENTS])
+        served = Requests(np.empty(most), np.empty(most, np.int64), np.empty(most, np.int8))
+        row_us, event_us = self.parameters.row_ns * 1e-3, self.parameters.event_ns * 1e-3
         count = serve(
-            asking_us, pixel, what, known_us, p.row_ns * 1e-3, p.event_ns * 1e-3,
-            self.view.columns, self._channel, self._queue, self._asked, self._waiting, self._left,
-            times, pixels, served,
+            self._requests(events), known_us, row_us, event_us, self.view.columns, self._channel,
+            served,
         )  # fmt: skip
-        stamps = np.rint(times[:count]).astype(np.int64) + self._origin_us
-        y, x = np.divmod(pixels[:count], self.view.columns)
-        sent = make_events(stamps, x, y, served[:count] & 1)
-        return with_cause(sent, served[:count] >> 1) if has_causes(events) else sent
+        stamps = np.rint(served.time[:count]).astype(np.int64) + self._origin_us
+        y, x = np.divmod(served.pixel[:count], self.view.columns)
+        sent = make_events(stamps, x, y, served.polarity[:count] & 1)
+        return with_cause(sent, served.polarity[:count] >> 1) if has_causes(events) else sent
 
-    def _requests(
-        self, events: Events
-    ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int8]]:
-        """Return the request times of the events [us], sorted, their pixels, and their codes.
-
-        A code is the polarity and, above its bit, the cause.
-        """
+    def _requests(self, events: Events) -> Requests:
+        """Return the events in the order of their requests; above the polarity is the cause."""
         pixels = pixels_of(events, self.view.columns)
         drawn = rng.next_uniforms(self.view.seed, rng.REQUEST, pixels, self._numbers)
         asking_us = (events["t"] - self._origin_us) + (drawn - 0.5)
@@ -131,7 +125,7 @@ class ArbiterHooks(Hooks):
         what = events["p"].astype(np.int8)
         if has_causes(events):
             what |= events["cause"].astype(np.int8) << 1
-        return asking_us[order], pixels[order], what[order]
+        return Requests(asking_us[order], pixels[order], what[order])
 
 
 _FAR_US = np.iinfo(np.int64).max

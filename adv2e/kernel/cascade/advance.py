@@ -13,88 +13,77 @@ from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.cascade import pixel as alone
 from adv2e.kernel.cascade import screen as cascade
 from adv2e.kernel.cascade import second_look
+from adv2e.kernel.cascade.substep import Piece
 from adv2e.kernel.comparator import with_room
 from adv2e.kernel.lanes import exchange
+from adv2e.kernel.leak import leak_strip, leaks, lower_references
 from adv2e.kernel.photoreceptor import path as noise_path
 from adv2e.kernel.photoreceptor import strip as photoreceptor
 from adv2e.kernel.photoreceptor.path import LANES
 from adv2e.kernel.screen import STRIDE
-from adv2e.kernel.strip_leak import leak_strip, leaks, lower_references
 from adv2e.kernel.work_queue import STRIP
 
 _f = np.float32
 
 
-class Scratch(NamedTuple):
-    """Memory for the cascade, one for each thread."""
+class CascadeMemory(NamedTuple):
+    """Memory for the cascade, beside that of the strip."""
 
     x: NDArray[np.float64]  # log intensity at the start of an interval, how far it goes, and the
     dx: NDArray[np.float64]  # light at its end, where the interval is cut into pieces
     light: NDArray[np.float32]
-    nothing: NDArray[np.float64]  # places in a piece from which on pixels may fire: its start
     whole: NDArray[np.float64]  # ends of the one substep of a piece in which nothing moves
-    noise: photoreceptor.Scratch
-    path: noise_path.Path  # noise of a few pixels,
+    noise: photoreceptor.StripNoise
+    path: noise_path.NoisePath  # noise of a few pixels,
     places: NDArray[np.int64]  # which are at these places of the sorted strip
     look: second_look.Look
 
 
-def scratch() -> Scratch:
+def new_memory() -> CascadeMemory:
     """Return fresh memory."""
-    x, dx, nothing = (np.zeros(STRIP) for _ in range(3))
-    return Scratch(
-        x, dx, np.ones(STRIP, np.float32), nothing, np.arange(2.0), photoreceptor.scratch(),
-        noise_path.path(), np.zeros(LANES, np.int64), second_look.memory(),
+    return CascadeMemory(
+        np.zeros(STRIP), np.zeros(STRIP), np.ones(STRIP, np.float32), np.arange(2.0),
+        photoreceptor.new_memory(), noise_path.new_path(), np.zeros(LANES, np.int64),
+        second_look.new_look(),
     )  # fmt: skip
 
 
 @kernel
-def _begin_pieces(strip, circuit, scratch):
-    """Store log intensity at LIGHT_0, its change up to LIGHT_1, and LIGHT_1 in `scratch`."""
+def _begin_pieces(strip, circuit, own):
+    """Store log intensity at LIGHT_0, its change up to LIGHT_1, and LIGHT_1 in memory `own`."""
     for k in range(STRIP):
         x0 = exchange.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
         x1 = exchange.log_of(np.float64(strip[screen.LIGHT_1 + k]), circuit)
-        scratch.x[k], scratch.dx[k] = x0, x1 - x0
-        scratch.light[k] = strip[screen.LIGHT_1 + k]
+        own.x[k], own.dx[k] = x0, x1 - x0
+        own.light[k] = strip[screen.LIGHT_1 + k]
 
 
 @kernel
-def _end_piece(share, strip, circuit, scratch):
+def _end_piece(share, strip, circuit, own):
     """Row LIGHT_1 at `share` of the interval."""
     for k in range(STRIP):
-        x = scratch.x[k] + scratch.dx[k] * share
+        x = own.x[k] + own.dx[k] * share
         light = special.exp(x)
         light = light if x >= circuit.knee else circuit.slope * x
-        strip[screen.LIGHT_1 + k] = _f(light) if share < 1.0 else scratch.light[k]
+        strip[screen.LIGHT_1 + k] = _f(light) if share < 1.0 else own.light[k]
 
 
 @kernel
-def _solve_alone(
-    lo, m, ta, length, start, before, substeps, places, levels, t_base, circuit, samples, depth,
-    state, scratch, pixels, found, keys, times, n,
-):  # fmt: skip
-    """Solve m pixels over a piece one by one; `samples` and `depth`: of their noise."""
+def _solve_alone(lo, m, piece, circuit, state, memory, buffer, n):
+    """Solve m pixels over a piece one by one."""
     j, s = np.int64(0), 0.0
     while j < m:
-        n, j, s = alone.solve_flagged(
-            lo, j, m, s, ta, length, start, before, substeps, places, levels, t_base, circuit,
-            samples, depth, scratch.cascade.path, state, scratch.strip, pixels, found, keys, times,
-            n,
-        )  # fmt: skip
+        n, j, s = alone.solve_flagged(lo, j, m, s, piece, circuit, state, memory, buffer, n)
         if j < m:
-            keys, times = with_room(keys, times, n, n + 1)
-    return n, keys, times
+            buffer = with_room(buffer, n, n + 1)
+    return n, buffer
 
 
 @kernel
-def _solve_beside_noise(
-    lo, number, which, ta, length, start, before, substeps, places, levels, t_base, circuit,
-    laws, state, scratch, keys, times, n,
-):  # fmt: skip
+def _solve_beside_noise(lo, number, which, piece, circuit, laws, state, memory, buffer, n):
     """Solve the flagged pixels of a strip over piece `number` of all, which has law `which`."""
-    strip, pixels, own = scratch.strip, scratch.pixels, scratch.cascade
+    strip, pixels, own = memory.strip.rows, memory.strip.pixels, memory.cascade
     noise, path = own.noise, own.path
-    factor = _f(min(levels[0], levels[1]))
     for g in range(laws.samples.shape[1]):
         samples, depth, p = laws.samples[which, g], laws.levels[which, g], noise.ends[g]
         while p < noise.ends[g + 1]:
@@ -109,30 +98,20 @@ def _solve_beside_noise(
             noise_path.sample(
                 size, own.places, number, samples, depth, circuit, laws.fine[which], noise, path
             )
-            second_look.find_places(
-                size, pixels, substeps, places, length, samples, depth, factor, circuit, strip,
-                path, own.look,
-            )  # fmt: skip
-            n, keys, times = _solve_alone(
-                lo, size, ta, length, start, before, substeps, places, levels, t_base, circuit,
-                samples, depth, state, scratch, pixels, own.look.found, keys, times, n,
-            )  # fmt: skip
-    return n, keys, times
+            second_look.find_places(size, piece, circuit, memory.strip, path, own.look)
+            n, buffer = _solve_alone(lo, size, piece, circuit, state, memory, buffer, n)
+    return n, buffer
 
 
 @kernel
-def advance(
-    lo, count, start, ta, length, f, number, still, circuit, plan, t_base, state, scratch, keys,
-    times, n,
-):  # fmt: skip
-    """Advance one strip over interval f, piece by piece; `still`: nothing moves or lags in it.
+def advance(lo, count, interval, number, still, circuit, plan, state, memory, buffer, n):
+    """Advance one strip over an interval, piece by piece; `still`: nothing moves or lags in it.
 
     number : of its first piece, of all in the recording
     """
     (plan,) = borrowed(plan)
-    strip, falls, means, pixels = scratch.strip, scratch.falls, scratch.means, scratch.pixels
-    own, laws, cut = scratch.cascade, plan.laws, plan.cut[f]
-    noise, has_leak, is_noisy = own.noise, leaks(circuit), circuit.noise_rms > 0.0
+    strip, own, laws, f = memory.strip.rows, memory.cascade, plan.laws, interval.f
+    cut, noise, has_leak, is_noisy = plan.cut[f], own.noise, leaks(circuit), circuit.noise_rms > 0.0
     pieces = plan.pieces[cut]
     first, rise = plan.factors[f], plan.factors[f + 1] - plan.factors[f]
     if pieces > 1 and not still:
@@ -140,43 +119,40 @@ def advance(
     for p in range(pieces):
         substeps, places, which = plan.substeps[cut, p], plan.places[cut, p], plan.law[cut, p]
         a, b = plan.ends[cut, p], plan.ends[cut, p + 1]
-        t0, piece = ta + a * length, (b - a) * length
+        t0, length = interval.start + a * interval.length, (b - a) * interval.length
         levels = first + rise * a, first + rise * b
         if pieces > 1 and not still:
             _end_piece(b, strip, circuit, own)
         if has_leak:
-            leak_strip(lo, count, piece, circuit, state, strip, falls, means)
+            leak_strip(lo, count, length, circuit, state, memory.strip)
         if still:
             substeps, places = np.int64(1), own.whole
             cascade.stay(strip)
         else:
-            cascade.follow(strip, substeps, places, piece, circuit, plan.weights[cut, p])
+            cascade.follow(strip, substeps, places, length, circuit, plan.weights[cut, p])
         on, off, factor = screen.ON, screen.OFF, _f(min(levels[0], levels[1]))
         if is_noisy:
             photoreceptor.draw(lo, count, number + p, which, still, circuit, laws, strip, noise)
             cascade.leave_room(strip, factor, noise.rows)
             on, off, factor = cascade.ON, cascade.OFF, _f(1.0)
-        end = _f(t0 + piece - start)
+        end = _f(t0 + length - interval.origin)
         if still:
             cascade.flag_still(strip, end, on, off, factor)
         else:
             screen.flag(
-                strip, end, _f(circuit.dark * piece), _f(circuit.per_dn * piece),
+                strip, end, _f(circuit.dark * length), _f(circuit.per_dn * length),
                 _f(circuit.slope * circuit.knee), cascade.SECOND,
                 cascade.SECOND + substeps * STRIDE, on, off, factor, cascade.LARGEST,
             )  # fmt: skip
+        piece = Piece(interval.origin, t0, length, a / (b - a), substeps, places, levels)
         if is_noisy:
-            n, keys, times = _solve_beside_noise(
-                lo, number + p, which, t0, piece, start, a / (b - a), substeps, places, levels,
-                t_base, circuit, laws, state, scratch, keys, times, n,
-            )  # fmt: skip
+            n, buffer = _solve_beside_noise(
+                lo, number + p, which, piece, circuit, laws, state, memory, buffer, n
+            )
         else:
-            m = screen.flagged(strip, pixels)
-            n, keys, times = _solve_alone(
-                lo, m, t0, piece, start, a / (b - a), substeps, places, levels, t_base, circuit,
-                np.int64(1), np.int64(0), state, scratch, pixels, own.nothing, keys, times, n,
-            )  # fmt: skip
+            m = screen.flagged(strip, memory.strip.pixels)
+            n, buffer = _solve_alone(lo, m, piece, circuit, state, memory, buffer, n)
         if has_leak:
-            lower_references(lo, count, state, strip, falls)
+            lower_references(lo, count, state, memory.strip)
         cascade.step_on(strip, substeps, still)
-    return n, keys, times
+    return n, buffer

@@ -20,12 +20,14 @@ from adv2e.kernel.cascade.substep import (
     fire_until,
     hull,
     lag_curve,
+    leak_factor,
     light_of,
     may_fire,
     plus,
     value,
 )
 from adv2e.kernel.lanes.exchange import log_of, watch
+from adv2e.kernel.leak import fall_over, leak_rate
 from adv2e.kernel.noise import next_noise
 from adv2e.kernel.photoreceptor import path as noise
 from adv2e.kernel.screen import STRIDE
@@ -54,27 +56,21 @@ def _is_clear(hold, due, until, high, low, step, reference, factor):
 
 
 @kernel
-def fire_in_cells(
-    i, c, place, s0, span, hull, samples, levels, step, signal, reference, factor, t_base, circuit,
-    state, path, keys, times, n,
-):  # fmt: skip
+def fire_in_cells(i, c, place, hull, step, signal, circuit, state, path, buffer, n):
     """Fire the events of pixel i, which is in lane c, in a substep from `place` on.
 
-    Parameters
-    ----------
-    s0, span : float
-        Where the substep is in its piece.
     hull : (2,) float
         Bounds of the signal without noise, less x at the start of the substep.
-    samples, levels : int
-        Of the noise: between two samples are 2^levels cells.
-    path : Path
+    path : NoisePath
         Of the noise.
 
     The others, and what is returned, are those of
     :func:`adv2e.kernel.cascade.substep.fire_until`.
     """
-    rows, seen, cells = path.rows, noise.seen_from(circuit), samples << levels
+    rows, seen, s0, span = path.rows, noise.seen_from(circuit), step.place, step.span
+    samples, levels = path.grid[noise.SAMPLES], path.grid[noise.LEVELS]
+    cells = samples << levels
+    reference, factor = state[per_pixel.REFERENCE, i], leak_factor(i, circuit, state)
     width = 1.0 / (cells * span)  # of a cell, as a part of the substep
     corner = circuit.follower * step.h * width
     least, most = step.x + hull[1], step.x + hull[0]
@@ -100,23 +96,24 @@ def fire_in_cells(
                 noise.draw_stretches(1, levels, circuit, path)
                 continue
             c0, c1, c2, c3 = noise.cubic_of(r, c, begin, width, corner, seen, rows)
-            n, stopped, reference, factor = fire_until(
-                i, max(begin, place), end, step, signal, Cubic(c0, c1, c2, c3), reference, factor,
-                t_base, circuit, state, keys, times, n,
+            n, stopped = fire_until(
+                i, max(begin, place), end, step, signal, Cubic(c0, c1, c2, c3), circuit, state,
+                buffer, n,
             )  # fmt: skip
             if stopped != DONE:
-                return n, stopped, reference, factor
+                return n, stopped
+            reference, factor = state[per_pixel.REFERENCE, i], leak_factor(i, circuit, state)
             hold, due = state[per_pixel.HOLD, i], next_noise(i, circuit, state)[1]
             fired = True
         r, begin = after, end
-    return n, DONE, reference, factor
+    return n, DONE
 
 
 _SIXTH = 1.0 / 6.0
 _LARGEST_RATIO = math.tanh(0.5 * cascade.LARGEST_STEP)
 
 
-class _Way(NamedTuple):
+class _Passage(NamedTuple):
     """Course of a pixel's light through a piece, and the substeps that it needs."""
 
     x0: float  # log intensity at its start
@@ -130,11 +127,8 @@ class _Way(NamedTuple):
 
 
 @kernel
-def _way(k, length, before, circuit, strip):
-    """Return the course of light and the substeps of pixel k in a piece of `length` us.
-
-    before : time since the interval's start at the start of the piece, in lengths of the piece
-    """
+def _passage(k, piece, circuit, strip):
+    """Return the course of light and the substeps of pixel k in a piece."""
     i0, i1 = float(strip[screen.LIGHT_0 + k]), float(strip[screen.LIGHT_1 + k])
     x0 = log_of(i0, circuit)
     dx = log_of(i1, circuit) - x0
@@ -145,11 +139,13 @@ def _way(k, length, before, circuit, strip):
     alone = abs(i1 - i0) > 0.99 * _LARGEST_RATIO * (i0 + i1) or steep > 0.99
     if not (alone or mixed or brightest > 0.99 * screen.LARGEST_LIGHT):
         rests = i0 == i1 and strip[screen.LAG_0 + k] == 0.0 and strip[cascade.SECOND + k] == 0.0
-        return _Way(x0, dx, rests, False, 1.0, 0.0, 1.0, 1.0)
-    corner = (circuit.dark + circuit.per_dn * brightest) * length
+        return _Passage(x0, dx, rests, False, 1.0, 0.0, 1.0, 1.0)
+    corner = (circuit.dark + circuit.per_dn * brightest) * piece.length
     knee = min(max((circuit.knee - x0) / dx, 0.0), 1.0) if mixed and dx != 0.0 else 1.0
     shortest = LONGEST / corner if corner > LONGEST else 1.0
-    return _Way(x0, dx, False, True, knee, -before, shortest, 1.0 / (FEWEST * max(steep, 1.0)))
+    return _Passage(
+        x0, dx, False, True, knee, -piece.before, shortest, 1.0 / (FEWEST * max(steep, 1.0))
+    )
 
 
 @kernel
@@ -198,11 +194,8 @@ def _first_busy(k, j, count, places, away, dx, fall, on, off, due, strip):
 
 
 @kernel
-def _solve(
-    lo, k, c, s_from, ta, length, start, before, substeps, places, levels, t_base, circuit,
-    samples, depth, path, state, strip, keys, times, n,
-):  # fmt: skip
-    """Events of pixel k of the strip that begins at pixel `lo`, over a piece [ta, ta + length] us.
+def _solve(k, i, c, s_from, piece, circuit, path, state, strip, buffer, n):
+    """Events of one pixel, number k of its strip and i of all, over a piece.
 
     Parameters
     ----------
@@ -210,17 +203,7 @@ def _solve(
         Lane of its noise.
     s_from : float
         Place before which there is no event, or from which to go on.
-    start : float
-        Origin of the times in row DUE [us].
-    before : float
-        Time from the start of the interval to that of the piece, in lengths of the piece.
-    substeps : int
-        Number of substeps of the piece in the rows of the screen; they end at `places` of it.
-    levels : (2,) float
-        Factors on both thresholds at the ends of the piece.
-    samples, depth : int
-        Samples of photoreceptor noise; between two samples are 2^depth cells.
-    path : Path
+    path : NoisePath
         Photoreceptor noise.
 
     Returns
@@ -228,19 +211,18 @@ def _solve(
     Number of events so far, and DONE, or, where there is no room left for them, the place from
     which to go on.  The rows of the pixel are then those at the end of the piece.
     """
-    i = lo + k
-    way = _way(k, length, before, circuit, strip)
+    length, substeps, places, levels = piece.length, piece.substeps, piece.places, piece.levels
+    way = _passage(k, piece, circuit, strip)
     on_level, off_level = state[per_pixel.ON, i], state[per_pixel.OFF, i]
     on_0, on_rise = on_level * levels[0], on_level * (levels[1] - levels[0])
     off_0, off_rise = off_level * levels[0], off_level * (levels[1] - levels[0])
-    factor = state[per_pixel.LEAK_FACTOR, i] if circuit.leak_jitter > 0.0 else 1.0
-    reference = state[per_pixel.REFERENCE, i]
+    reference, factor = state[per_pixel.REFERENCE, i], leak_factor(i, circuit, state)
     light1, fallen1, s1 = float(strip[screen.LIGHT_0 + k]), 0.0, 0.0
     u1, q1 = float(strip[cascade.FIRST + k]), float(strip[cascade.SECOND + k])
     follows_light = way.alone or circuit.photo_leak > 0.0
     hold, due = state[per_pixel.HOLD, i], next_noise(i, circuit, state)[1]
     # substeps in which nothing happens are passed quickly, where they differ in lags alone
-    skims, fall_all = not (follows_light or way.rests), on_level * circuit.leak * length
+    skims, fall_all = not (follows_light or way.rests), fall_over(on_level, length, 0.0, circuit)
     least_on, least_off = min(on_0, on_0 + on_rise), min(off_0, off_0 + off_rise)
     is_noisy, noise_high, noise_low = circuit.noise_rms > 0.0, 0.0, 0.0
     if is_noisy:
@@ -253,7 +235,8 @@ def _solve(
             if hold < 0.0:
                 j = _first_busy(
                     k, j, substeps, places, way.x0 - reference, way.dx, factor * fall_all,
-                    least_on - noise_high, least_off + noise_low, (due - ta) / length, strip,
+                    least_on - noise_high, least_off + noise_low, (due - piece.start) / length,
+                    strip,
                 )  # fmt: skip
             s1, fallen1 = places[j], fall_all * places[j]
             u1 = float(strip[cascade.FIRST + j * STRIDE + k])
@@ -270,15 +253,15 @@ def _solve(
             q1 = float(strip[cascade.SECOND + j * STRIDE + k])
         span = s1 - s0
         h, d, x = span * length, span * way.dx, way.x0 + s0 * way.dx
-        t0 = ta + s0 * length
+        t0 = piece.start + s0 * length
         on_log = x + 0.5 * d >= circuit.knee
         dark, per_dn = circuit.dark * h, circuit.per_dn * h
-        fall = on_level * circuit.leak * h
+        mean = 0.0
         if follows_light:
             middle = light_of(x + 0.5 * d, on_log, circuit)
             light1 = light_of(x + d, on_log, circuit)
             mean = (light0 + 4.0 * middle + light1) * _SIXTH
-            fall += on_level * circuit.photo_leak * mean * h
+        fall = fall_over(on_level, h, mean, circuit)
         fallen1 = fallen0 + fall
         if way.alone:
             u1 = _after(u0, d, dark + per_dn * mean, per_dn * (light1 - light0))
@@ -308,57 +291,51 @@ def _solve(
             q1 = q1 if abs(q1) > screen.AT_REST else 0.0
             if idle:
                 continue
-        l0 = on_level * (circuit.leak + circuit.photo_leak * light0) * h
-        l1 = on_level * (circuit.leak + circuit.photo_leak * light1) * h
+        l0 = on_level * leak_rate(light0, circuit) * h
+        l1 = on_level * leak_rate(light1, circuit) * h
         step = Substep(
-            t0, h, x, d, on0, on1, off0, off1, fallen0, l0, 3.0 * fall - 2.0 * l0 - l1,
-            l0 + l1 - 2.0 * fall,
+            s0, span, t0, h, x, d, on0, on1, off0, off1, fallen0, l0,
+            3.0 * fall - 2.0 * l0 - l1, l0 + l1 - 2.0 * fall,
         )  # fmt: skip
         signal = plus(lag, x, d, 0.0, 0.0)
         place = max((s_from - s0) / span, 0.0)
         if is_noisy:
-            n, place, reference, factor = fire_in_cells(
-                i, c, place, s0, span, hull(u0, u1, q0, q1, d), samples, depth, step, signal,
-                reference, factor, t_base, circuit, state, path, keys, times, n,
-            )  # fmt: skip
+            n, place = fire_in_cells(
+                i, c, place, hull(u0, u1, q0, q1, d), step, signal, circuit, state, path, buffer, n
+            )
         else:
-            n, place, reference, factor = fire_until(
-                i, place, 1.0, step, signal, NO_NOISE, reference, factor, t_base, circuit, state,
-                keys, times, n,
-            )  # fmt: skip
+            n, place = fire_until(i, place, 1.0, step, signal, NO_NOISE, circuit, state, buffer, n)
         if place != DONE:
-            state[per_pixel.REFERENCE, i] = reference
             return n, s0 + place * span
+        reference, factor = state[per_pixel.REFERENCE, i], leak_factor(i, circuit, state)
         hold, due = state[per_pixel.HOLD, i], next_noise(i, circuit, state)[1]
     state[per_pixel.REFERENCE, i] = reference - factor * fallen1
     strip[screen.LAG_1 + k] = u1
     strip[cascade.SECOND + substeps * STRIDE + k] = q1
-    watch(k, i, way.x0 + way.dx, start, circuit, state, strip)
+    watch(k, i, way.x0 + way.dx, piece.origin, circuit, state, strip)
     return n, DONE
 
 
 @kernel
-def solve_flagged(
-    lo, j, m, s, ta, length, start, before, substeps, places, levels, t_base, circuit, samples,
-    depth, path, state, strip, pixels, found, keys, times, n,
-):  # fmt: skip
+def solve_flagged(lo, j, m, s, piece, circuit, state, memory, buffer, n):
     """Events of the flagged pixels, from the j-th of m on, which is solved from place s on.
 
-    found : (m,)
-        Places from which on there may be events; beyond 1: none.
+    Beside noise, `found` of the second look has the places from which on there may be events;
+    beyond 1: none.
 
     Returns the number of events, and j and s where it stopped: j = m, or there was no room left.
     """
-    state, strip, pixels, keys, times = borrowed(state, strip, pixels, keys, times)
-    path, found, places = borrowed(path, found, places)
+    piece, state, memory, buffer = borrowed(piece, state, memory, buffer)
+    strip, pixels, path = memory.strip.rows, memory.strip.pixels, memory.cascade.path
+    is_noisy, found = circuit.noise_rms > 0.0, memory.cascade.look.found
     while j < m:
-        if found[j] > 1.0:
-            strip[screen.HIT + pixels[j]] = 0.0
+        k, first = pixels[j], found[j] if is_noisy else 0.0
+        if first > 1.0:
+            strip[screen.HIT + k] = 0.0
         else:
             n, s = _solve(
-                lo, pixels[j], j, max(s, found[j]), ta, length, start, before, substeps, places,
-                levels, t_base, circuit, samples, depth, path, state, strip, keys, times, n,
-            )  # fmt: skip
+                k, lo + k, j, max(s, first), piece, circuit, path, state, strip, buffer, n
+            )
             if s != DONE:
                 break
         j, s = j + 1, 0.0

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from adv2e.kernel.photoreceptor.law import (
     CELLS_AT_WHITE,
     Laws,
-    Noise,
+    NoiseTerms,
     cells_of,
     laws_for,
     no_laws,
@@ -66,7 +66,7 @@ def plan_for(
     follower: float,
     factors: _Array,
     simple: bool,
-    noise: Noise | None = None,
+    noise: NoiseTerms | None = None,
 ) -> Plan:
     """Return the plan of intervals.
 
@@ -82,7 +82,7 @@ def plan_for(
         Factors on both thresholds.
     simple : bool
         See :class:`Plan`.
-    noise : Noise, optional
+    noise : NoiseTerms, optional
         Photoreceptor noise.
     """
     distinct, cut = np.unique(lengths, return_inverse=True)
@@ -111,7 +111,7 @@ def plan_for(
     )
 
 
-def _pieces(length: float, fastest: float, noise: Noise | None) -> list[_Array]:
+def _pieces(length: float, fastest: float, noise: NoiseTerms | None) -> list[_Array]:
     """Return the places of the ends of substeps, piece by piece, in an interval of `length` us."""
     upto = 1.001 * length * fastest
     ends = [0.0]

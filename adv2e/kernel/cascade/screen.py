@@ -59,10 +59,10 @@ _M0, _M1, _M2, _M3, _M4 = (
 )
 
 
-def scratch() -> NDArray[np.float32]:
+def new_rows() -> NDArray[np.float32]:
     """Return the flat array of rows of one strip."""
     strip = np.zeros(SIZE, np.float32)
-    strip[: screen.SIZE] = screen.scratch()
+    strip[: screen.SIZE] = screen.new_rows()
     return strip
 
 

@@ -58,7 +58,7 @@ class Look(NamedTuple):
     found: NDArray[np.float64]  # (LANES,): places in the piece
 
 
-def memory() -> Look:
+def new_look() -> Look:
     """Return fresh memory."""
     return Look(np.zeros(_SIZE, np.float32), np.zeros(MOST_CELLS, np.int64), np.zeros(LANES))
 
@@ -106,8 +106,9 @@ def _leave_room(size, a, b, room, pixels, places, strip, rows):
 
 
 @kernel
-def _leave_rooms(size, pixels, substeps, places, samples, strip, look):
+def _leave_rooms(size, piece, samples, memory, look):
     """Rows _UP and _DOWN of each stretch, those of the substeps in which it is."""
+    strip, pixels, substeps, places = memory.rows, memory.pixels, piece.substeps, piece.places
     a, b, room = np.int64(0), np.int64(1), np.int64(0)
     _leave_room(size, a, b, room, pixels, places, strip, look.rows)
     for s in range(samples):
@@ -164,33 +165,29 @@ def _look_at_stretches(count, samples, levels, third, seen, circuit, path, look)
 
 
 @kernel
-def find_places(
-    size, pixels, substeps, places, length, samples, levels, factor, circuit, strip, path, look
-):  # fmt: skip
+def find_places(size, piece, circuit, memory, path, look):
     """Fill `look.found` with the earliest place in a piece at which each pixel may fire.
+
+    A place beyond 1: the pixel cannot fire.
 
     Parameters
     ----------
     size : int
         Number of pixels, the samples of which are in `path`.
-    pixels : (LANES,) int64
-        Their numbers in the strip.
-    substeps, places, length
-        Substeps of the piece, see :func:`adv2e.kernel.cascade.screen.follow`.
-    samples, levels : int
-        Samples of the piece; between two samples are 2^levels cells.
-    factor : float32
-        Least factor on the thresholds.
-    path : Path
+    piece : Piece
+    memory : StripMemory
+        With the numbers of these pixels.
+    path : NoisePath
     look : Look
-        A place beyond 1: the pixel cannot fire.
     """
-    strip, path, look = borrowed(strip, path, look)
+    piece, memory, path, look = borrowed(piece, memory, path, look)
     rows, seen = look.rows, noise.seen_from(circuit)
-    _load(size, pixels, factor, circuit.photo_leak > 0.0, strip, rows)
-    _leave_rooms(size, pixels, substeps, places, samples, strip, look)
+    samples, levels = path.grid[noise.SAMPLES], path.grid[noise.LEVELS]
+    factor = _f(min(piece.levels[0], piece.levels[1]))
+    _load(size, memory.pixels, factor, circuit.photo_leak > 0.0, memory.rows, rows)
+    _leave_rooms(size, piece, samples, memory, look)
     cells, q, waiting = samples << levels, np.int64(1) << levels, np.int64(0)
-    third = _f(circuit.follower * length / (3.0 * cells))
+    third = _f(circuit.follower * piece.length / (3.0 * cells))
     high, low = rows[_HIGH : _HIGH + LANES], rows[_LOW : _LOW + LANES]
     for s in range(samples):
         noise.bound_stretch(size, s, levels, seen, high, low, path.rows)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, special
 from adv2e.kernel.causes import cause_by_most, note_parts
@@ -32,7 +35,7 @@ _SETTLED = 1e-4
 slope where it is used changes by less than itself."""
 
 
-class Curve(NamedTuple):
+class SignalCurve(NamedTuple):
     """Coefficients of a polynomial, swing and corner b of an exponential."""
 
     c0: float
@@ -58,7 +61,7 @@ def lag_curve(u0, slope0, bend0, u1, slope1, bend1, q0, d, b):
     p4 = -15.0 * rise + 7.0 * turn - bend
     p5 = 6.0 * rise - 3.0 * turn + 0.5 * bend
     if b == 0.0:
-        return Curve(p0, p1, p2, p3, p4, p5, 0.0, 0.0)
+        return SignalCurve(p0, p1, p2, p3, p4, p5, 0.0, 0.0)
     if b < _SLOW:
         # the series, whose seventh term is taken for one like the sixth
         s1 = b * (p0 - q0) - d
@@ -66,20 +69,20 @@ def lag_curve(u0, slope0, bend0, u1, slope1, bend1, q0, d, b):
         s3 = b * (p2 - s2) / 3.0
         s4 = b * (p3 - s3) / 4.0
         s5 = b * (p4 - s4) / 5.0
-        return Curve(q0, s1, s2, s3, s4, s5 + b * (p5 - s5) / 6.0, 0.0, 0.0)
+        return SignalCurve(q0, s1, s2, s3, s4, s5 + b * (p5 - s5) / 6.0, 0.0, 0.0)
     lag = 1.0 / b
     p4 -= 5.0 * p5 * lag
     p3 -= 4.0 * p4 * lag
     p2 -= 3.0 * p3 * lag
     p1 -= 2.0 * p2 * lag
     p0 -= (p1 + d) * lag
-    return Curve(p0, p1, p2, p3, p4, p5, q0 - p0, b)
+    return SignalCurve(p0, p1, p2, p3, p4, p5, q0 - p0, b)
 
 
 @kernel
 def plus(curve, c0, c1, c2, c3):
     """Add a cubic to a curve."""
-    return Curve(
+    return SignalCurve(
         curve.c0 + c0, curve.c1 + c1, curve.c2 + c2, curve.c3 + c3, curve.c4, curve.c5,
         curve.swing, curve.b,
     )  # fmt: skip
@@ -88,7 +91,7 @@ def plus(curve, c0, c1, c2, c3):
 @kernel
 def mirrored(curve):
     """Return the curve of the opposite sign."""
-    return Curve(
+    return SignalCurve(
         -curve.c0, -curve.c1, -curve.c2, -curve.c3, -curve.c4, -curve.c5, -curve.swing, curve.b
     )
 
@@ -203,9 +206,23 @@ class Cubic(NamedTuple):
 NO_NOISE = Cubic(0.0, 0.0, 0.0, 0.0)
 
 
+class Piece(NamedTuple):
+    """Part of an interval, the lags at the ends of whose substeps are kept."""
+
+    origin: float  # from which due times count [us]
+    start: float  # its start [us]
+    length: float  # its length [us]
+    before: float  # time from the start of the interval to its own, in lengths of the piece
+    substeps: int
+    places: NDArray[np.float64]  # where they end, as shares of the piece
+    levels: tuple[float, float]  # factors on both thresholds at its ends
+
+
 class Substep(NamedTuple):
     """Light, thresholds and leak of a pixel in a substep."""
 
+    place: float  # its start, as a share of the piece
+    span: float  # its length, likewise
     t0: float  # its start [us]
     h: float  # its length [us]
     x: float  # log intensity at its start
@@ -275,17 +292,21 @@ def _shifted(found, sign, level, slope):
 
 
 @kernel
-def fire_until(
-    i, t, upto, step, signal, noise, reference, factor, t_base, circuit, state, keys, times, n
-):  # fmt: skip
+def leak_factor(i, circuit, state):
+    """Return the leak speed of pixel i, relative to the nominal one."""
+    return state[per_pixel.LEAK_FACTOR, i] if circuit.leak_jitter > 0.0 else 1.0
+
+
+@kernel
+def fire_until(i, t, upto, step, signal, noise, circuit, state, buffer, n):
     """Fire the events of pixel i in a substep from t on, until `upto`.
 
     signal, noise : signal by the light alone, and the photoreceptor noise on top of it
 
-    Returns the number of events; DONE or the place at which the buffer was full; the reference, as
-    if leak had always had its present speed; and that speed.
+    Returns the number of events, and DONE or the place at which the buffer was full.  In row
+    REFERENCE the reference is as if leak had always had its present speed.
     """
-    jitter, h = circuit.leak_jitter > 0.0, step.h
+    h, reference, factor = step.h, state[per_pixel.REFERENCE, i], leak_factor(i, circuit, state)
     on_level, off_level = state[per_pixel.ON, i], state[per_pixel.OFF, i]
     signal = plus(signal, noise.c0, noise.c1, noise.c2, noise.c3)
     if state[per_pixel.HOLD, i] >= 0.0:
@@ -297,8 +318,8 @@ def fire_until(
             now, by_noise = reference - factor * fallen(step, t), noise_at(noise, t)
             note_parts(i, now, seen - by_noise, by_noise, 0.0, state)
     while True:
-        if n == keys.shape[0]:
-            return n, t, reference, factor
+        if n == buffer.keys.shape[0]:
+            break
         kind, t_end = noise_within(i, step.t0 + t * h, step.t0 + upto * h, circuit, state)
         end = upto if kind == NONE else max(t, (t_end - step.t0) / h)
         away = plus(
@@ -326,7 +347,8 @@ def fire_until(
         if by_signal:
             t = min(up, down)
         elif kind == NONE:
-            return n, DONE, reference, factor
+            t = DONE
+            break
         else:
             t = end
             light = _light_at(step.x + step.d * t, circuit)
@@ -338,9 +360,9 @@ def fire_until(
             now = reference - factor * fallen(step, t)
             seen, by_noise = value(signal, t), noise_at(noise, t)
             cause = cause_by_most(i, polarity, now, seen - by_noise, by_noise, 0.0, circuit, state)
-        n = fire(i, when, polarity, cause, t_base, circuit, state, keys, times, n)
+        n = fire(i, when, polarity, cause, circuit, state, buffer, n)
         before = factor
-        factor = state[per_pixel.LEAK_FACTOR, i] if jitter else 1.0
+        factor = leak_factor(i, circuit, state)
         level = on_level if polarity > 0 else -off_level
         beyond = circuit.overshoot * level
         if circuit.dead_time > 0.0:
@@ -348,7 +370,8 @@ def fire_until(
             if hold >= step.t0 + upto * h:
                 state[per_pixel.HOLD, i] = hold
                 state[per_pixel.BEYOND, i] = beyond
-                return n, DONE, reference, factor
+                t = DONE
+                break
             t = (hold - step.t0) / h
         if circuit.dead_time > 0.0 or not by_signal:
             reference = value(signal, t) + factor * fallen(step, t) + beyond
@@ -364,3 +387,5 @@ def fire_until(
             now = reference - factor * fallen(step, t)
             by_noise = noise_at(noise, t)
             note_parts(i, now, value(signal, t) - by_noise, by_noise, 0.0, state)
+    state[per_pixel.REFERENCE, i] = reference
+    return n, t

@@ -14,11 +14,12 @@ _TRIES = 3
 
 
 @kernel
-def cross(count, ta, length, circuit, lanes):
+def cross(count, interval, circuit, lanes):
     """Reset the reference, or begin the refractory period, of lanes that found their crossing.
 
     Lanes with other targets are left as they are.
     """
+    ta, length = interval.start, interval.length
     dead = circuit.dead_time / length
     has_dead_time = circuit.dead_time > 0.0
     for j in range(count):
@@ -105,10 +106,10 @@ def note_releases(lo, count, pixels, state, lanes):
 
 
 @inlined
-def fire_lane(i, j, when, polarity, cause, t_base, circuit, state, lanes, keys, times, n):
+def fire_lane(i, j, when, polarity, cause, circuit, state, lanes, buffer, n):
     """Write an event of pixel i at the place of its lane j; returns the number of events."""
     before = state[per_pixel.LEAK_FACTOR, i]
-    n = fire(i, when, polarity, cause, t_base, circuit, state, keys, times, n)
+    n = fire(i, when, polarity, cause, circuit, state, buffer, n)
     if circuit.leak_jitter > 0.0:
         _change_leak(j, 1.0 / before * state[per_pixel.LEAK_FACTOR, i], lanes)
     return n
@@ -129,9 +130,9 @@ def _change_leak(j, share, lanes):
 
 
 @kernel
-def fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n):
+def fire_found(lo, m, circuit, state, pixels, lanes, buffer, n):
     """Write the events of the crossings that were found; returns the number of events."""
-    keys, times = borrowed(keys, times)
+    (buffer,) = borrowed(buffer)
     for j in range(m):
         event = lanes[rows.EVENT + j]
         if event != 0.0:
@@ -141,5 +142,5 @@ def fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n):
             before = after if circuit.dead_time > 0.0 else after - level
             cause = cause_by_leak(i, event, before, circuit, state)
             note_reset(i, after, circuit, state)
-            n = fire_lane(i, j, when, event, cause, t_base, circuit, state, lanes, keys, times, n)
+            n = fire_lane(i, j, when, event, cause, circuit, state, lanes, buffer, n)
     return n

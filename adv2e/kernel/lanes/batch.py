@@ -31,49 +31,47 @@ def _waiting(m, lanes):
 
 
 @kernel
-def decide(
-    lo, m, waiting, start, ta, length, t_base, circuit, rule, state, strip, pixels, lanes, keys,
-    times, n,
-):  # fmt: skip
+def decide(lo, m, waiting, interval, circuit, rule, state, memory, buffer, n):
     """Choose the next target of each of m lanes; none of them then waits for a dead time to end.
 
     All lanes that wait now are among the first `waiting` ones.
 
     Returns (lanes with a target, events so far); at most one event a lane is written.
     """
-    keys, times = borrowed(keys, times)
+    (buffer,) = borrowed(buffer)
+    pixels, lanes, length = memory.pixels, memory.lanes, interval.length
     while True:
         if waiting > 0:
             release(whole(waiting), length, circuit, rule, lanes)
             if circuit.causes:
                 note_releases(lo, waiting, pixels, state, lanes)
-        choose(whole(m), ta, length, circuit, lanes)
+        choose(whole(m), interval, circuit, lanes)
         for j in range(m):
             seeks = lanes[rows.SEEKS + j]
             if seeks in (rows.DOUBTFUL, rows.STUCK):
-                i = lo + pixels[j]
-                n = go_on(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n)
+                n = go_on(lo + pixels[j], j, interval, circuit, state, lanes, buffer, n)
                 seeks = lanes[rows.SEEKS + j]
             if seeks == rows.DONE and lanes[rows.END + j] < 1.0:
                 next_piece(j, circuit, lanes)
-        m = sort_out(lo, m, start, state, strip, pixels, lanes)
+        m = sort_out(lo, m, interval.origin, state, memory)
         waiting = _waiting(m, lanes)
         if waiting == 0:
             return m, n
 
 
 @kernel
-def search(lo, m, ta, length, t_base, circuit, rule, state, pixels, lanes, keys, times, n):
+def search(lo, m, interval, circuit, rule, state, memory, buffer, n):
     """Find the target of every lane; returns the number of events, and `waiting` for `decide`.
 
     At most one event a lane is written.
     """
+    pixels, lanes, length = memory.pixels, memory.lanes, interval.length
     count = whole(m)
     guess(lanes, count, length, circuit)
     evaluate(lanes, count, length, circuit, rule)
     refine(lanes, count, length, circuit)
-    cross(count, ta, length, circuit, lanes)
-    n = fire_found(lo, m, t_base, circuit, state, pixels, lanes, keys, times, n)
+    cross(count, interval, circuit, lanes)
+    n = fire_found(lo, m, circuit, state, pixels, lanes, buffer, n)
     for j in range(m):
         seeks = lanes[rows.SEEKS + j]
         if seeks in (rows.INJECTED, rows.HALF) or (
@@ -81,5 +79,5 @@ def search(lo, m, ta, length, t_base, circuit, rule, state, pixels, lanes, keys,
         ):
             found_stop(lo + pixels[j], j, circuit, state, lanes)
         elif seeks == rows.OPEN:
-            open_piece(j, ta, length, lanes)
+            open_piece(j, interval, lanes)
     return n, _waiting(m, lanes)

@@ -41,8 +41,9 @@ def watch(k, i, x1, start, circuit, state, strip):
 
 
 @kernel
-def _gather(lo, m, circuit, state, strip, falls, pixels, lanes):
+def _gather(lo, m, circuit, state, memory):
     """Fill the lanes with what screen and state know of their pixels."""
+    strip, falls, pixels, lanes = memory.rows, memory.falls, memory.pixels, memory.lanes
     for j in range(m):
         k = pixels[j]
         lanes[rows.U0 + j] = strip[screen.LAG_0 + k]
@@ -71,12 +72,13 @@ def held_first(m, strip, pixels):
 
 
 @kernel
-def load(lo, m, ta, length, circuit, state, strip, falls, pixels, lanes):
+def load(lo, m, interval, circuit, state, memory):
     """Put the m flagged pixels in lanes, at the start of their interval."""
-    _gather(lo, m, circuit, state, strip, falls, pixels, lanes)
+    _gather(lo, m, circuit, state, memory)
+    pixels, lanes = memory.pixels, memory.lanes
     knee = circuit.knee
     knee_dn = circuit.slope * knee
-    leak, photo_leak = leak_over(length, circuit)
+    leak, photo_leak = leak_over(interval.length, circuit)
     for j in range(whole(m)):
         i0, i1 = lanes[rows.I0 + j], lanes[rows.I1 + j]
         u0, u1 = lanes[rows.U0 + j], lanes[rows.U1 + j]
@@ -108,7 +110,7 @@ def load(lo, m, ta, length, circuit, state, strip, falls, pixels, lanes):
         lanes[rows.LIGHT_P + j] = i1
         lanes[rows.FALLEN_P + j] = lanes[rows.TAIL + j]
         lanes[rows.AWAY_P + j] = x0 + dx + u1 + lanes[rows.TAIL + j] - lanes[rows.REFERENCE + j]
-        seeks, place = first_place(j, ta, length, lanes)
+        seeks, place = first_place(j, interval, lanes)
         seeks = rows.OPEN if in_pieces else seeks
         place = end if in_pieces else place
         lanes[rows.SEEKS + j] = seeks
@@ -123,9 +125,9 @@ def load(lo, m, ta, length, circuit, state, strip, falls, pixels, lanes):
 
 
 @kernel
-def _finish(j, lo, start, state, strip, pixels, lanes):
+def _finish(j, lo, start, state, memory):
     """Write back the state of a lane at the end of its interval."""
-    k = pixels[j]
+    strip, lanes, k = memory.rows, memory.lanes, memory.pixels[j]
     reference = lanes[rows.REFERENCE + j] - lanes[rows.TAIL + j]
     hold = lanes[rows.HOLD + j]
     state[per_pixel.REFERENCE, lo + k] = reference
@@ -141,12 +143,13 @@ def _finish(j, lo, start, state, strip, pixels, lanes):
 
 
 @kernel
-def sort_out(lo, m, start, state, strip, pixels, lanes):
+def sort_out(lo, m, start, state, memory):
     """Take out the lanes that are done; returns how many stay."""
+    pixels, lanes = memory.pixels, memory.lanes
     leaving, staying = 0, 0
     for j in range(m):
         if lanes[rows.SEEKS + j] == rows.DONE:
-            _finish(j, lo, start, state, strip, pixels, lanes)
+            _finish(j, lo, start, state, memory)
             lanes[_LEAVING + leaving] = j
             leaving += 1
         else:

@@ -115,8 +115,9 @@ def found_stop(i, j, circuit, state, lanes):
 
 
 @inlined
-def _find_stop(i, j, ta, length, circuit, state, lanes):
+def _find_stop(i, j, interval, circuit, state, lanes):
     """Set STOP to the end of the piece; returns whether a noise event comes before it."""
+    ta, length = interval.start, interval.length
     end = lanes[rows.END + j]
     t_end = ta + end * length
     if lanes[rows.NOISE + j] < t_end:
@@ -132,7 +133,7 @@ def _find_stop(i, j, ta, length, circuit, state, lanes):
 
 
 @inlined
-def _pass_stop(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
+def _pass_stop(i, j, interval, circuit, state, lanes, buffer, n):
     """Move to STOP, before which there is no crossing, and fire a noise event that is due there.
 
     Returns the number of events, and whether there was one.
@@ -150,8 +151,8 @@ def _pass_stop(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
     lanes[rows.NOISE + j] = next_noise(i, circuit, state)[1]
     if polarity == 0:
         return n, False
-    when = ta + lanes[rows.S + j] * length
-    n = fire_lane(i, j, when, polarity, kind, t_base, circuit, state, lanes, keys, times, n)
+    when = interval.start + lanes[rows.S + j] * interval.length
+    n = fire_lane(i, j, when, polarity, kind, circuit, state, lanes, buffer, n)
     lanes[rows.REFERENCE + j] += lanes[rows.AWAY_S + j]
     lanes[rows.AWAY_S + j] = 0.0
     note_reset(i, lanes[rows.REFERENCE + j] - lanes[rows.FALLEN_S + j], circuit, state)
@@ -159,10 +160,11 @@ def _pass_stop(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
 
 
 @inlined
-def go_on(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
+def go_on(i, j, interval, circuit, state, lanes, buffer, n):
     """Choose the next target of a DOUBTFUL lane.  Returns the number of events."""
+    ta, length = interval.start, interval.length
     while True:
-        if lanes[rows.KNOWN + j] < 0.5 and _find_stop(i, j, ta, length, circuit, state, lanes):
+        if lanes[rows.KNOWN + j] < 0.5 and _find_stop(i, j, interval, circuit, state, lanes):
             return n
         what = _choose(j, length, circuit, lanes)
         if what == rows.HALF:
@@ -176,7 +178,7 @@ def go_on(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n):
             return n
         lanes[rows.SEEKS + j] = rows.DOUBTFUL
         span = lanes[rows.STOP + j] - lanes[rows.S + j]
-        n, fired = _pass_stop(i, j, ta, length, t_base, circuit, state, lanes, keys, times, n)
+        n, fired = _pass_stop(i, j, interval, circuit, state, lanes, buffer, n)
         if fired and circuit.dead_time > 0.0:
             release = lanes[rows.S + j] + circuit.dead_time / length
             lanes[rows.HOLD + j] = ta + release * length
@@ -226,8 +228,9 @@ def sure_of_leak(away_s, away_p, lag_s, lag_p, span, dx, rate_s, rate_p, leak, o
 
 
 @kernel
-def choose(count, ta, length, circuit, lanes):
+def choose(count, interval, circuit, lanes):
     """Choose the first threshold crossing of lanes that are READY, or mark them DOUBTFUL."""
+    ta, length = interval.start, interval.length
     dark, per_dn = circuit.dark * length, circuit.per_dn * length
     for j in range(count):
         seeks = lanes[rows.SEEKS + j]

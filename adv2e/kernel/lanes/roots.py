@@ -285,11 +285,12 @@ def end_of_piece(base, x0, dx, knee, mixed, brightest):
 
 
 @kernel
-def first_place(j, ta, length, lanes):
+def first_place(j, interval, lanes):
     """Return the first target of a lane at the start of its piece, and its place."""
     base, end = lanes[rows.BASE + j], lanes[rows.END + j]
     hold = lanes[rows.HOLD + j]
     held = hold >= 0.0
+    ta, length = interval.start, interval.length
     release = (hold - ta) / length
     injected = (lanes[rows.NOISE + j] - ta) / length
     seeks = rows.INJECTED if injected < end else rows.READY
@@ -300,7 +301,7 @@ def first_place(j, ta, length, lanes):
 
 
 @kernel
-def open_piece(j, ta, length, lanes):
+def open_piece(j, interval, lanes):
     """Begin a piece at whose end the signal was evaluated."""
     lag = lanes[rows.LAG_E + j]
     lag = lag if abs(lag) > screen.AT_REST else 0.0
@@ -310,7 +311,7 @@ def open_piece(j, ta, length, lanes):
     lanes[rows.TAIL + j] = fallen
     set_stop(j, lanes[rows.END + j], lag, lanes[rows.LIGHT_E + j], fallen, lanes)
     lanes[rows.KNOWN + j] = 0.0
-    seeks, place = first_place(j, ta, length, lanes)
+    seeks, place = first_place(j, interval, lanes)
     lanes[rows.SEEKS + j] = seeks
     lanes[rows.PLACE + j] = place
 

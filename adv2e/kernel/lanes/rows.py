@@ -85,7 +85,7 @@ DONE, STUCK, SEEK_ON, SEEK_OFF, TURN, INJECTED, RELEASE, READY, DOUBTFUL, OPEN, 
 )
 
 
-def scratch() -> NDArray[np.float64]:
+def new_rows() -> NDArray[np.float64]:
     """Return the flat array of rows; lanes that fill up a vector must be harmless."""
     rows = np.zeros(SIZE)
     for row in (I0, I1, END, STOP, DX, U0):

@@ -74,7 +74,7 @@ class Laws(NamedTuple):
     fine: NDArray[np.float32]  # (lengths, entries, levels, FINE)
 
 
-class Noise(NamedTuple):
+class NoiseTerms(NamedTuple):
     """Parameters of the noise that the tables depend on, besides the length of a piece."""
 
     dark: float  # corner of the low-pass in darkness [rad/us],
@@ -85,14 +85,14 @@ class Noise(NamedTuple):
     level: float  # the lower threshold [ln]
 
 
-def noise_of(circuit: Circuit, level: float, longest: float) -> Noise:
+def noise_of(circuit: Circuit, level: float, longest: float) -> NoiseTerms:
     """Return the parameters of the noise, with cells of at most `longest` us."""
     fastest = fastest_corner(circuit)
     cell = min(circuit.noise_step / fastest, longest)
-    return Noise(circuit.dark, fastest, circuit.follower, circuit.noise_rms, cell, level)
+    return NoiseTerms(circuit.dark, fastest, circuit.follower, circuit.noise_rms, cell, level)
 
 
-def laws_for(lengths: NDArray[np.float64], noise: Noise) -> Laws:
+def laws_for(lengths: NDArray[np.float64], noise: NoiseTerms) -> Laws:
     """Return the tables for pieces of these lengths [us], (lengths,)."""
     tables = [_table(length, noise) for length in lengths.tolist()]
     group, coarse, fine = (np.stack([table[c] for table in tables]) for c in (0, 3, 4))
@@ -116,12 +116,12 @@ def no_laws() -> Laws:
     )  # fmt: skip
 
 
-def cells_of(length: float, noise: Noise) -> float:
+def cells_of(length: float, noise: NoiseTerms) -> float:
     """Return the number of cells that the fastest pixel needs in `length` us, up to white."""
     return float(_needed(length, np.array([noise.fastest]), noise)[0])
 
 
-def _entries(noise: Noise) -> tuple[int, NDArray[np.float64]]:
+def _entries(noise: NoiseTerms) -> tuple[int, NDArray[np.float64]]:
     """Return the bits of the first corner, and the corner of each entry [rad/us]."""
     slowest = max(noise.dark, noise.fastest * _SLOWEST)
     ends = np.array([slowest, noise.fastest * _BRIGHTEST], np.float32).view(np.int32) >> SHIFT
@@ -130,7 +130,7 @@ def _entries(noise: Noise) -> tuple[int, NDArray[np.float64]]:
     return int(ends[0]), middle.view(np.float32).astype(float)
 
 
-def _needed(length: float, corner: NDArray[Any], noise: Noise) -> NDArray[Any]:
+def _needed(length: float, corner: NDArray[Any], noise: NoiseTerms) -> NDArray[Any]:
     """Return the number of cells that each corner needs in `length` us.
 
     Behind one pole the noise is a line in each cell, so that the length of cells is a part of the
@@ -142,7 +142,7 @@ def _needed(length: float, corner: NDArray[Any], noise: Noise) -> NDArray[Any]:
     return np.ceil(length * np.cbrt(corner * b * (corner + b) / (96.0 * _FINE**2)))
 
 
-class Step(NamedTuple):
+class Moments(NamedTuple):
     """Moments from one instant to another, for each corner: of noise of rms 1."""
 
     kept_n: NDArray[Any]
@@ -153,7 +153,7 @@ class Step(NamedTuple):
     ss: NDArray[Any]
 
 
-def step_over(h: NDArray[Any], w: NDArray[Any], b: float) -> Step:
+def step_over(h: NDArray[Any], w: NDArray[Any], b: float) -> Moments:
     """Return the moments of (n, s) after `h` us; without a second pole (b = 0), s is 0."""
     a, beta = w * h, b * h
     kept_n, kept_s = np.exp(-a), np.exp(-beta)
@@ -164,7 +164,7 @@ def step_over(h: NDArray[Any], w: NDArray[Any], b: float) -> Step:
     nn = -np.expm1(-2.0 * a)
     ns = share - kept_n * (given + kept_s * share)
     ss = share - (given**2 + 2.0 * given * kept_s * share + kept_s**2 * share)
-    return Step(kept_n, given, kept_s, nn, np.maximum(ns, 0.0), np.maximum(ss, 0.0))
+    return Moments(kept_n, given, kept_s, nn, np.maximum(ns, 0.0), np.maximum(ss, 0.0))
 
 
 class Bridge(NamedTuple):
@@ -212,7 +212,7 @@ def _factors(nn: NDArray[Any], ns: NDArray[Any], ss: NDArray[Any]) -> list[NDArr
 
 
 @lru_cache(maxsize=64)
-def _table(length: float, noise: Noise) -> tuple[NDArray[Any], ...]:
+def _table(length: float, noise: NoiseTerms) -> tuple[NDArray[Any], ...]:
     """Return group of each entry, samples and levels of each group, coarse and fine table.
 
     length : of the piece [us]

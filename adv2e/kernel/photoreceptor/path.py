@@ -51,19 +51,24 @@ also the lane that it comes from, and the sample that it begins with."""
 _NUMBERS = 4 * LANES
 
 
-class Path(NamedTuple):
+SAMPLES, LEVELS = 0, 1
+"""Entries of the grid: samples of a piece; between two of them are 2^levels cells."""
+
+
+class NoisePath(NamedTuple):
     """Memory for the noise of some pixels."""
 
+    grid: NDArray[np.int64]  # (2,)
     rows: NDArray[np.float32]
     numbers: NDArray[np.int64]
     words: NDArray[np.uint32]  # (4, LANES)
     normals: NDArray[np.float32]  # (4, LANES)
 
 
-def path() -> Path:
+def new_path() -> NoisePath:
     """Return fresh memory."""
-    return Path(
-        np.zeros(2 * THERE, np.float32), np.zeros(2 * _NUMBERS, np.int64),
+    return NoisePath(
+        np.zeros(2, np.int64), np.zeros(2 * THERE, np.float32), np.zeros(2 * _NUMBERS, np.int64),
         np.zeros((4, LANES), np.uint32), np.zeros((4, LANES), np.float32),
     )  # fmt: skip
 
@@ -187,12 +192,13 @@ def sample(size, places, piece, samples, levels, circuit, fine, noise, path):
     samples, levels : int
         Samples and levels of their group.
     fine : (entries, levels, FINE) float32
-    noise : Scratch
+    noise : StripNoise
         Noise of the strip.
-    path : Path
+    path : NoisePath
     """
     fine, noise, path = borrowed(fine, noise, path)
     rows, normals, follows = path.rows, path.normals, circuit.follower > 0.0
+    path.grid[SAMPLES], path.grid[LEVELS] = samples, levels
     for c in range(size):
         p = places[c]
         path.numbers[PIXELS + c] = noise.pixels[p]

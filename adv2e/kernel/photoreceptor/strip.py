@@ -33,7 +33,7 @@ _f = np.float32
 _ZERO, _ONE = _f(0.0), _f(1.0)
 
 
-class Scratch(NamedTuple):
+class StripNoise(NamedTuple):
     """Memory for the noise of a strip, one for each thread."""
 
     rows: NDArray[np.float32]
@@ -46,10 +46,10 @@ class Scratch(NamedTuple):
     normals: NDArray[np.float32]
 
 
-def scratch() -> Scratch:
+def new_memory() -> StripNoise:
     """Return fresh memory."""
     entries, order, pixels = (np.zeros(STRIP, np.int64) for _ in range(3))
-    return Scratch(
+    return StripNoise(
         np.zeros(BY + COARSE * STRIDE, np.float32), entries, order, pixels,
         np.zeros(MOST_GROUPS + 1, np.int64), np.zeros(1, np.int64),
         np.zeros((4, STRIDE), np.uint32), np.zeros((4, STRIDE), np.float32),
@@ -68,9 +68,9 @@ def _find_entries(count, dark, per_dn, lowest, most, strip, entries):
 
 
 @kernel
-def _sort(lo, count, group, groups, coarse, scratch):
+def _sort(lo, count, group, groups, coarse, noise):
     """Sort the pixels by group, and their noise and tables likewise."""
-    order, ends, entries, rows = scratch.order, scratch.ends, scratch.entries, scratch.rows
+    order, ends, entries, rows = noise.order, noise.ends, noise.entries, noise.rows
     for g in range(groups + 1):
         ends[g] = 0
     for k in range(count):
@@ -87,7 +87,7 @@ def _sort(lo, count, group, groups, coarse, scratch):
     ends[0] = 0
     for p in range(count):
         k = order[p]
-        scratch.pixels[p] = lo + k
+        noise.pixels[p] = lo + k
         rows[NOISE_1 + p] = rows[NOISE + k]
         rows[SEEN_1 + p] = rows[SEEN + k]
     for p in range(count):
@@ -97,14 +97,14 @@ def _sort(lo, count, group, groups, coarse, scratch):
 
 
 @kernel
-def put_back(count, scratch):
+def put_back(count, noise):
     """Rows NOISE and SEEN, of the pixels in their own order."""
-    rows, order = scratch.rows, scratch.order
-    if scratch.kept[0] > 0:
+    rows, order = noise.rows, noise.order
+    if noise.kept[0] > 0:
         for p in range(count):
             rows[NOISE + order[p]] = rows[NOISE_1 + p]
             rows[SEEN + order[p]] = rows[SEEN_1 + p]
-    scratch.kept[0] = 0
+    noise.kept[0] = 0
 
 
 @kernel
@@ -195,37 +195,37 @@ def _end(count, follows, order, rows):
 
 
 @kernel
-def draw(lo, count, piece, which, rests, circuit, laws, strip, scratch):
+def draw(lo, count, piece, which, rests, circuit, laws, strip, noise):
     """Draw the noise of a strip over piece number `piece` of all, which has law `which`.
 
     The light at both ends is in the rows of the screen; `rests`: it is that of the piece before.
     Fills rows HIGH and LOW.
     """
-    strip, laws, scratch = borrowed(strip, laws, scratch)
-    rows, normals, follows = scratch.rows, scratch.normals, circuit.follower > 0.0
-    if not rests or scratch.kept[0] != which + 1:
-        put_back(count, scratch)
+    strip, laws, noise = borrowed(strip, laws, noise)
+    rows, normals, follows = noise.rows, noise.normals, circuit.follower > 0.0
+    if not rests or noise.kept[0] != which + 1:
+        put_back(count, noise)
         _find_entries(
             count, _f(circuit.dark), _f(circuit.per_dn), laws.lowest, laws.group.shape[1] - 1,
-            strip, scratch.entries,
+            strip, noise.entries,
         )  # fmt: skip
-        _sort(lo, count, laws.group[which], laws.samples.shape[1], laws.coarse[which], scratch)
-        scratch.kept[0] = which + 1
+        _sort(lo, count, laws.group[which], laws.samples.shape[1], laws.coarse[which], noise)
+        noise.kept[0] = which + 1
     _begin(count, SEEN_1 if follows else NOISE_1, rows)
     a_block = 2 if follows else 4
     for g in range(laws.samples.shape[1]):
-        first, size = scratch.ends[g], scratch.ends[g + 1] - scratch.ends[g]
+        first, size = noise.ends[g], noise.ends[g + 1] - noise.ends[g]
         if size == 0:
             continue
         for j in range(laws.samples[which, g]):
             r = j % a_block
             if r == 0:
                 rng.normals32_of_pixels(
-                    circuit.seed, rng.PHOTORECEPTOR_SAMPLES, scratch.pixels[first : first + size],
-                    piece * BLOCKS + j // a_block, scratch.words, normals,
+                    circuit.seed, rng.PHOTORECEPTOR_SAMPLES, noise.pixels[first : first + size],
+                    piece * BLOCKS + j // a_block, noise.words, normals,
                 )  # fmt: skip
             if follows:
                 _sample_of_two(first, size, normals[2 * r], normals[2 * r + 1], rows)
             else:
                 _sample(first, size, normals[r], rows)
-    _end(count, follows, scratch.order, rows)
+    _end(count, follows, noise.order, rows)

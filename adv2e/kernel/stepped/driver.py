@@ -53,8 +53,20 @@ class Run(NamedTuple):
     off: NDArray[np.float64]
 
 
-class Scratch(NamedTuple):
-    """Memory for a tile, one for each thread."""
+class TimeStep(NamedTuple):
+    """Step of a run."""
+
+    m: int  # its number in the run
+    draw: int  # and of all, for the noise drawn there
+    start: float  # [us]
+    h: float  # its length [us]
+    share: float  # of its piece that is over at its end
+    half: float  # half of that which it takes
+    second: tuple[float, ...]  # weights of the second pole
+
+
+class SteppedMemory(NamedTuple):
+    """Memory of whoever works on a strip."""
 
     strip: NDArray[np.float64]
     normals: NDArray[np.float64]
@@ -62,10 +74,10 @@ class Scratch(NamedTuple):
     pixels: NDArray[np.int64]  # numbers, within the strip, of the pixels that may fire
 
 
-def scratch() -> Scratch:
+def new_memory() -> SteppedMemory:
     """Return fresh memory."""
-    return Scratch(
-        rows.scratch(),
+    return SteppedMemory(
+        rows.new_rows(),
         rows.normals(),
         np.zeros(rows.WIDTH, np.float32),
         np.zeros(rows.WIDTH + 16, np.int64),
@@ -124,11 +136,11 @@ def _close(lo, count, draw, circuit, state, strip):
 
 
 @kernel
-def _load_x(frames, before, share, lo, count, circuit, scratch, row):
-    """Log intensity of a strip, `share` of the way from frame `before` to the next."""
-    light = scratch.light[:count]
-    load(frames, before, share, lo, 0.0, light)
-    signal.log_of_light(light, circuit, scratch.strip[row : row + count])
+def _load_x(schedule, at, lo, count, circuit, memory, row):
+    """Log intensity of a strip at instant `at`."""
+    light = memory.light[:count]
+    load(schedule.frames, schedule.before[at], schedule.share[at], lo, 0.0, light)
+    signal.log_of_light(light, circuit, memory.strip[row : row + count])
 
 
 @kernel
@@ -162,12 +174,13 @@ def _take_piece(n, p, pieces, strip):
 
 
 @kernel
-def _make_step(lo, count, n, m, h, share, half, draw, circuit, run, second, normals, strip):
-    """Signal of a strip over step m of a run, of h us, that ends at `share` of its piece."""
+def _make_step(lo, count, n, step, circuit, run, memory):
+    """Signal of a strip over a step of a run."""
+    m, h, draw, normals, strip = step.m, step.h, step.draw, memory.normals, memory.strip
     if circuit.causes:
         signal.keep_parts(n, strip)
     if circuit.update == EXACT:
-        signal.advance_light(n, share, half, circuit, strip)
+        signal.advance_light(n, step.share, step.half, circuit, strip)
     else:
         signal.next_sample(n, circuit, strip)
     if run.gain.shape[0] > 0:
@@ -190,11 +203,12 @@ def _make_step(lo, count, n, m, h, share, half, draw, circuit, run, second, norm
             rng.normals_of_four(circuit.seed, rng.PHOTORECEPTOR_STEPS, lo, n, draw // 4, normals)
         signal.add_noise(n, circuit.noise_rms, normals[draw % 4], strip)
         if circuit.causes:
-            signal.see_noise(n, circuit.follower > 0.0, second, strip)
+            signal.see_noise(n, circuit.follower > 0.0, step.second, strip)
     else:
         signal.no_noise(n, strip)
     if circuit.follower > 0.0:
-        signal.second_pole(n, circuit.follower * h, circuit.update != EXACT, second, strip)
+        stepped = circuit.update != EXACT
+        signal.second_pole(n, circuit.follower * h, stepped, step.second, strip)
         signal.take_signal(n, rows.SECOND, strip)
     else:
         signal.take_signal(n, rows.INPUT1, strip)
@@ -211,9 +225,9 @@ def _level(course, m, i):
 
 
 @kernel
-def _screen_step(lo, count, n, m, end, h, circuit, run, strip):
-    """Return the number of pixels that may fire in step m of a run; marks them in row HIT."""
-    on, off = 1.0, 1.0
+def _screen_step(lo, count, n, step, circuit, run, strip):
+    """Return the number of pixels that may fire in a step of a run; marks them in row HIT."""
+    m, on, off = step.m, 1.0, 1.0
     if run.on.shape[1] > 1:
         events.step_thresholds(count, lo, run.on, m + 1, rows.ON, rows.ON_STEP, strip)
     elif run.on.shape[0] > 0:
@@ -222,75 +236,64 @@ def _screen_step(lo, count, n, m, end, h, circuit, run, strip):
         events.step_thresholds(count, lo, run.off, m + 1, rows.OFF, rows.OFF_STEP, strip)
     elif run.off.shape[0] > 0:
         off = min(run.off[m, 0], run.off[m + 1, 0])
-    return events.screen(n, end, leak_over(h, circuit), on, off, strip)
+    return events.screen(n, step.start + step.h, leak_over(step.h, circuit), on, off, strip)
 
 
 @kernel
-def _fire_gathered(
-    c, count, lo, m, ta, h, share, t_base, circuit, run, injected, state, strip, pixels, keys,
-    times, number,
-):  # fmt: skip
+def _fire_gathered(c, count, lo, step, circuit, run, injected, state, memory, buffer, number):
     """Fire the events of pixels c to count of those that may fire, while there is room.
 
     Returns the first pixel that is not done, and the number of events so far.
     """
-    run, injected, state, strip = borrowed(run, injected, state, strip)
-    pixels, keys, times = borrowed(pixels, keys, times)
-    leak = leak_over(h, circuit)
-    while c < count and number + _ROOM <= keys.shape[0]:
-        k = pixels[c]
+    run, injected, state, memory = borrowed(run, injected, state, memory)
+    (buffer,) = borrowed(buffer)
+    m = step.m
+    while c < count and number + _ROOM <= buffer.keys.shape[0]:
+        k = memory.pixels[c]
         i = lo + k
         levels = (
             _level(run.on, m, i), _level(run.on, m + 1, i),
             _level(run.off, m, i), _level(run.off, m + 1, i),
         )  # fmt: skip
         number, whole = events.fire_step(
-            k, i, ta, h, leak, levels, share, t_base, circuit, injected, state, strip, keys, times,
-            number,
-        )  # fmt: skip
+            k, i, step, levels, circuit, injected, state, memory.strip, buffer, number
+        )
         c += whole
     return c, number
 
 
 @kernel
-def _fire_step(
-    lo, n, m, ta, h, share, t_base, circuit, run, injected, state, scratch, keys, times, number
-):  # fmt: skip
-    """Fire the events of step m of a run, which begins at ta us."""
-    strip, pixels = scratch.strip, scratch.pixels
-    c, count = np.int64(0), events.gather(n, strip, pixels)
+def _fire_step(lo, n, step, circuit, run, injected, state, memory, buffer, number):
+    """Fire the events of a step of a run."""
+    c, count = np.int64(0), events.gather(n, memory.strip, memory.pixels)
     while c < count:
-        keys, times = with_room(keys, times, number, number + _ROOM)
+        buffer = with_room(buffer, number, number + _ROOM)
         c, number = _fire_gathered(
-            c, count, lo, m, ta, h, share, t_base, circuit, run, injected, state, strip, pixels,
-            keys, times, number,
-        )  # fmt: skip
-    return number, keys, times
+            c, count, lo, step, circuit, run, injected, state, memory, buffer, number
+        )
+    return number, buffer
 
 
 @kernel
-def _strip(
-    lo, count, frames, before, share, starts, begins, last, circuit, run, injected, t_base, state,
-    scratch, keys, times, number,
-):  # fmt: skip
+def _strip(lo, count, schedule, circuit, run, injected, state, memory, buffer, number):
     """Advance one strip over a run."""
-    frames, before, share, starts, last = borrowed(frames, before, share, starts, last)
-    run, injected, state, scratch = borrowed(run, injected, state, scratch)
-    strip = scratch.strip
+    schedule, run, injected, state = borrowed(schedule, run, injected, state)
+    (memory,) = borrowed(memory)
+    starts, last, strip = schedule.starts, schedule.last, memory.strip
     n = -(-count // 16) * 16
     _open(lo, count, n, circuit, run, injected, state, strip)
     draw = np.int64(0)
     if circuit.noise_rms > 0.0:
         draw = np.int64(state[per_pixel.NOISE_DRAW, lo])
-    _load_x(frames, before[run.first], share[run.first], lo, count, circuit, scratch, rows.XA)
+    _load_x(schedule, run.first, lo, count, circuit, memory, rows.XA)
     m = np.int64(0)
     for f in range(run.first, run.last):
         length, steps = starts[f + 1] - starts[f], run.steps[f]
         total = run.pieces * steps
-        _load_x(frames, before[f + 1], share[f + 1], lo, count, circuit, scratch, rows.XB)
+        _load_x(schedule, f + 1, lo, count, circuit, memory, rows.XB)
         if last[f + 1]:
-            _load_x(frames, before[f + 2], share[f + 2], lo, count, circuit, scratch, rows.AHEAD)
-        _take_samples(count, begins and f == 0, last[f], last[f + 1], strip)
+            _load_x(schedule, f + 2, lo, count, circuit, memory, rows.AHEAD)
+        _take_samples(count, schedule.begins and f == 0, last[f], last[f + 1], strip)
         h, half = length / total, 0.5 / steps
         second = signal.second_pole_weights(circuit.follower * h, circuit.update != EXACT)
         first = run.first_step if f == run.first else 0
@@ -305,29 +308,23 @@ def _strip(
                     signal.change_light(lo, count, run.gain, m, circuit, strip)
                 if run.drive.shape[0] > 0:
                     signal.add_course(n, lo, count, run.drive, m, rows.DRIVEN1, strip)
-            _make_step(
-                lo, count, n, m, h, (r + 1) / steps, half, draw, circuit, run, second,
-                scratch.normals, strip,
-            )  # fmt: skip
-            ta = starts[f] + length * (j / total)
+            start = starts[f] + length * (j / total)
+            step = TimeStep(m, draw, start, h, (r + 1) / steps, half, second)
+            _make_step(lo, count, n, step, circuit, run, memory)
+            if _screen_step(lo, count, n, step, circuit, run, strip) > 0:
+                number, buffer = _fire_step(
+                    lo, n, step, circuit, run, injected, state, memory, buffer, number
+                )
             draw += 1
-            if _screen_step(lo, count, n, m, ta + h, h, circuit, run, strip) > 0:
-                number, keys, times = _fire_step(
-                    lo, n, m, ta, h, 2.0 * half, t_base, circuit, run, injected, state, scratch,
-                    keys, times, number,
-                )  # fmt: skip
             m += 1
         for k in range(n):
             strip[rows.XA + k] = strip[rows.XB + k]
     _close(lo, count, draw, circuit, state, strip)
-    return number, keys, times
+    return number, buffer
 
 
 @kernel
-def run_stepped(
-    claimed, most, frames, before, share, starts, begins, last, circuit, run, injected, t_base,
-    state, scratch, keys, times,
-):  # fmt: skip
+def run_stepped(claimed, most, schedule, circuit, run, injected, state, memory, buffer):
     """Advance strips that nobody else works on over a run.
 
     The other arguments, and what is returned, are those of :func:`adv2e.kernel.exact.run_exact`.
@@ -339,8 +336,7 @@ def run_stepped(
             break
         for s in range(lo, hi, rows.WIDTH):
             count = min(rows.WIDTH, hi - s)
-            number, keys, times = _strip(
-                s, count, frames, before, share, starts, begins, last, circuit, run, injected,
-                t_base, state, scratch, keys, times, number,
-            )  # fmt: skip
-    return number, keys, times
+            number, buffer = _strip(
+                s, count, schedule, circuit, run, injected, state, memory, buffer, number
+            )
+    return number, buffer

@@ -20,6 +20,7 @@ from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.causes import cause_by_most, note_parts
 from adv2e.kernel.circuit import EXACT
 from adv2e.kernel.comparator import TIE, fire
+from adv2e.kernel.leak import leak_over
 from adv2e.kernel.noise import NONE, next_noise, noise_within, take_noise
 from adv2e.kernel.stepped import rows
 
@@ -229,17 +230,15 @@ def _parts(k, s, signal, strip):
 
 
 @kernel
-def fire_step(
-    k, i, ta, h, leak, levels, share, t_base, circuit, injected, state, strip, keys, times, n
-):  # fmt: skip
-    """Fire the events of pixel k of a strip, i of the state, in the step [ta, ta + h] us.
+def fire_step(k, i, step, levels, circuit, injected, state, strip, buffer, n):
+    """Fire the events of pixel k of a strip, i of the state, in a step.
 
-    leak: see `_fall`; levels: factors on the ON threshold at both ends of the step, on OFF
-    likewise; share: of its piece that the step takes.  Returns the number of events so far, and
-    whether there was room for all; if not, the next call goes on.
+    levels: factors on the ON threshold at both ends of the step, on OFF likewise.  Returns the
+    number of events so far, and whether there was room for all; if not, the next call goes on.
     """
-    injected, state, strip, keys, times = borrowed(injected, state, strip, keys, times)
+    injected, state, strip, buffer = borrowed(injected, state, strip, buffer)
     on0, on1, off0, off1 = levels
+    ta, h = step.start, step.h
     tb = ta + h
     s = strip[rows.FROM + k]
     on_level, off_level = state[per_pixel.ON, i], state[per_pixel.OFF, i]
@@ -249,7 +248,7 @@ def fire_step(
         strip[rows.SIGNAL0 + k], strip[rows.SIGNAL1 + k],
         strip[rows.SLOPE0 + k], strip[rows.SLOPE1 + k],
     )  # fmt: skip
-    fallen, slope0, slope1 = _fall(k, on_level, leak, strip)
+    fallen, slope0, slope1 = _fall(k, on_level, leak_over(h, circuit), strip)
     _, l1, l2, l3 = _cubic(0.0, fallen, slope0, slope1)
     reference = strip[rows.REFERENCE + k] + factor * fallen
     if state[per_pixel.HOLD, i] >= 0.0:
@@ -262,7 +261,7 @@ def fire_step(
             note_parts(i, now, *_parts(k, s, _at(c0, c1, c2, c3, s), strip), state)
     whole = True
     while True:
-        if n == keys.shape[0]:
+        if n == buffer.keys.shape[0]:
             whole = False
             break
         kind, t_end = _due_within(i, ta + s * h, tb, circuit, injected, state)
@@ -283,7 +282,7 @@ def fire_step(
             light0, light1 = strip[rows.LIGHT0 + k], strip[rows.LIGHT1 + k]
             light = light0 + (light1 - light0) * s_end
             if circuit.update == EXACT:
-                x = strip[rows.X1 + k] - strip[rows.MOVE + k] * share * (1.0 - s_end)
+                x = strip[rows.X1 + k] - strip[rows.MOVE + k] * (2.0 * step.half) * (1.0 - s_end)
                 light = _light_of(x, circuit)
             polarity = _take_due(i, kind, light, circuit, injected, state)
             if polarity == 0:
@@ -294,7 +293,7 @@ def fire_step(
             now = reference - factor * _at(0.0, l1, l2, l3, s_event)
             light, noise, added = _parts(k, s_event, _at(c0, c1, c2, c3, s_event), strip)
             cause = cause_by_most(i, polarity, now, light, noise, added, circuit, state)
-        n = fire(i, t, polarity, cause, t_base, circuit, state, keys, times, n)
+        n = fire(i, t, polarity, cause, circuit, state, buffer, n)
         before = factor
         factor = state[per_pixel.LEAK_FACTOR, i] if jitter else 1.0
         s = s_event

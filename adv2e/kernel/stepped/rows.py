@@ -59,7 +59,7 @@ _PADDED = WIDTH + 24  # rows must not share cache sets
 ) = range(0, 41 * _PADDED, _PADDED)
 
 
-def scratch() -> NDArray[np.float64]:
+def new_rows() -> NDArray[np.float64]:
     """Return the rows of a strip."""
     size, line = 41 * _PADDED, 8
     memory = np.zeros(size + line)
