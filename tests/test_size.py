@@ -20,18 +20,18 @@ PACKAGE = Path(adv2e.__file__).parent
 LIMITS = {
     "": 1370,
     "batches": 1400,
-    "cli": 1390,
+    "cli": 1400,
     "comparison": 650,
     "compilation": 210,
     "config": 1340,
     "conversion": 1270,
     "diagnosis": 6970,
-    "effects": 1630,
+    "effects": 1590,
     "exporting": 470,
     "files": 790,
     "formats": 5120,
     "inspection": 270,
-    "kernel": 4870,
+    "kernel": 4860,
     "light": 870,
     "motion": 360,
     "pixel": 580,
@@ -44,7 +44,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 375
+FILES = 373
 """Most modules of all packages together."""
 
 _SLACK = 60
