@@ -16,7 +16,7 @@ from adv2e.export.sequence import Sequence, open_sequences
 from adv2e.export.windows import MOST_EMPTY, Slice, before_images, between_images, by_count, by_time
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging, writing
-from adv2e.formats.assembly import events_in_order
+from adv2e.formats.reading import events_in_order
 
 DESCRIPTION = "export.json"
 """Name of the file that describes an export."""
