@@ -30,10 +30,8 @@ from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.events import Events
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging
-from adv2e.formats import compression
 from adv2e.formats.registry import check_frames, to_write
-from adv2e.formats.sink import Sink
-from adv2e.formats.writing import open_sink
+from adv2e.formats.writing import PACKAGES, Sink, open_sink
 from adv2e.geometry import Size
 from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.interpolation import network_of
@@ -327,7 +325,7 @@ def _metadata(
     crop = recording.selection.crop
     return {
         "adv2e": __version__,
-        "versions": versions((*recording.packages, *compression.PACKAGES, *runs)),
+        "versions": versions((*recording.packages, *PACKAGES, *runs)),
         "config": to_dict(config),
         "seed": config.seed,
         **({"effects": own} if own else {}),

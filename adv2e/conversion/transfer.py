@@ -26,13 +26,10 @@ from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging
-from adv2e.formats import compression
-from adv2e.formats.assembly import events_in_order, inside
 from adv2e.formats.event_file import EventFile, Progress
-from adv2e.formats.reading import open_events
+from adv2e.formats.reading import events_in_order, inside, open_events
 from adv2e.formats.registry import check_frames, to_write
-from adv2e.formats.sink import Sink
-from adv2e.formats.writing import open_sink
+from adv2e.formats.writing import PACKAGES, Sink, open_sink
 from adv2e.geometry import Rectangle
 from adv2e.light.pictures import picture_of, picture_white
 from adv2e.options import CopyOptions, EventInput, chosen, crop_of, takes
@@ -250,7 +247,7 @@ def copied_metadata(
         stored = {"frames": {"encoding": light.encoding, "full_scale": white}}
     return {
         "adv2e": __version__,
-        "versions": versions(compression.PACKAGES),
+        "versions": versions(PACKAGES),
         "source": origin,
         **made,
         "converted": {"adv2e": __version__, **origin, **converted},

@@ -27,7 +27,7 @@ from adv2e.conversion.transfer import copied_metadata, stored_picture
 from adv2e.errors import DataError
 from adv2e.events import Events, cut
 from adv2e.exporting.sequence import Sequence
-from adv2e.formats.assembly import events_in_order
+from adv2e.formats.reading import events_in_order
 from adv2e.formats.writing import open_sink
 
 USUAL_FRAMES = 42

@@ -24,7 +24,7 @@ from adv2e.exporting.windows import (
 )
 from adv2e.files.names import shown
 from adv2e.files.staging import Staging, writing
-from adv2e.formats.assembly import events_in_order
+from adv2e.formats.reading import events_in_order
 from adv2e.in_python import in_python
 from adv2e.options import EXPORTS, EventInput, ExportOptions, chosen, declared, takes
 

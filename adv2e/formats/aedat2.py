@@ -51,7 +51,7 @@ from adv2e.events import Events
 from adv2e.formats.binary import Numbers, blocks
 from adv2e.formats.clock import CONTINUE, Clock
 from adv2e.formats.event_file import Columns, EventFile, Facts
-from adv2e.formats.sink import Request, Writer, to_line
+from adv2e.formats.writing import Request, Writer, to_line
 from adv2e.sources.frame import Pixels, Shot
 
 _CHIPS = {

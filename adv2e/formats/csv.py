@@ -11,7 +11,7 @@ cause     with causes: see adv2e.causes
 ========= =====================================
 
 pandas and faery take this with their defaults.  Read are the columns that
-:mod:`adv2e.formats.column_names` names, in any order and among others, between commas, semicolons
+:mod:`adv2e.formats.columns` names, in any order and among others, between commas, semicolons
 or tabs.  faery's heading names the size, too: ``t,x@640,y@480,on``.  A line ``%geometry:640,480``
 is of Metavision, which writes ``x, y, p, t`` without a heading; both have times in microseconds.
 Any other file of four columns without a heading is read if its columns tell what they are.
@@ -38,10 +38,10 @@ from numpy.typing import NDArray
 from adv2e.causes import has_causes
 from adv2e.errors import DataError
 from adv2e.events import Events
-from adv2e.formats.column_names import find_columns, geometry_in, stated_unit, told_order
+from adv2e.formats.columns import find_columns, geometry_in, stated_unit, told_order
 from adv2e.formats.event_file import EventFile, Facts, described_geometry
-from adv2e.formats.sink import Request, Writer
-from adv2e.formats.text.reader import Form, events_of_lines
+from adv2e.formats.text import Form, events_of_lines
+from adv2e.formats.writing import Request, Writer
 
 _HEADING = b"t,x,y,p"
 _CAUSE = "cause"

@@ -9,20 +9,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.errors import DataError
 from adv2e.formats.clock import unwrapped
-from adv2e.formats.column_names import named_geometry
-from adv2e.formats.units import event_unit
-from adv2e.sources.frame import Light, Pixels, Shot
-from adv2e.sources.frame import rotated180 as turned_pixels
+from adv2e.formats.columns import event_unit, named_geometry
+from adv2e.sources.frame import Light, Shot
 from adv2e.sources.stored import recorded_light
 from adv2e.sources.times.units import Unit
 from adv2e.sources.tracks import Track, choose
@@ -52,7 +47,7 @@ class Facts:
     progress : callable, optional
         Is told how far the reading is.
     rotate180 : bool
-        Events and frames will be turned by half a turn, as the user says; see :func:`rotated180`.
+        Events and frames will be turned by half a turn, as the user says.
     track : str, optional
         Which of several streams the user wants: its number or its name.
     set_back : {'continue', 'sort'}, optional
@@ -271,38 +266,6 @@ class EventFile:
         """Files that are read, and their folder, where nothing may be written."""
         shots = self.shots() if self.shots is not None and self.facts.path.is_dir() else ()
         return [self.facts.path, *self.facts.inputs, *(shot.label for shot in shots)]
-
-
-def rotated180(file: EventFile) -> EventFile:
-    """Return a file of which events and frames are turned by half a turn.
-
-    Raises
-    ------
-    DataError
-        It does not state the size of its sensor.
-    """
-    geometry, shots = file.facts.geometry, file.shots
-    if geometry is None:
-        raise DataError(
-            f"{file.facts.path}: states no size of its sensor, which --rotate180 needs to turn the"
-            " events"
-        )
-    last_x, last_y = geometry[0] - 1, geometry[1] - 1
-
-    def parts() -> Iterator[Columns]:
-        for t, x, y, p in file.parts():
-            yield t, last_x - x.astype(np.int64), last_y - y.astype(np.int64), p
-
-    def turned() -> Iterator[Shot]:
-        assert shots is not None
-        for shot in shots():
-            yield replace(shot, load=partial(_turned, shot.load))
-
-    return replace(file, parts=parts, shots=None if shots is None else turned)
-
-
-def _turned(load: Callable[[], Pixels]) -> Pixels:
-    return turned_pixels(load())
 
 
 def described_geometry(description: Mapping[str, Any]) -> tuple[int, int] | None:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.files.expansion import check_expansion
-from adv2e.formats.column_names import SIZE_NAMES, named_geometry, unit_of_attribute
+from adv2e.formats.columns import SIZE_NAMES, named_geometry, unit_of_attribute
 from adv2e.formats.event_file import Facts
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.tracks import Track, counted

@@ -24,9 +24,8 @@ from adv2e.errors import OutputError
 from adv2e.events import EVENT_DTYPE, Events
 from adv2e.files.backlog import Backlog
 from adv2e.formats import causes
-from adv2e.formats.compression import compress, compress_shuffled
 from adv2e.formats.hdf5_layouts import DSEC, M3ED, MONASH, MVSEC, V2E, Layout
-from adv2e.formats.sink import Request, Writer, to_json
+from adv2e.formats.writing import Request, Writer, compress, compress_shuffled, to_json
 from adv2e.light.pictures import eight_bit
 from adv2e.ticks import S
 

@@ -1,6 +1,6 @@
 """Events of NumPy: in archives one structured array, or an array for each column; or one array.
 
-The columns are called as in :mod:`adv2e.formats.column_names`.  ``width`` and ``height`` tell the
+The columns are called as in :mod:`adv2e.formats.columns`.  ``width`` and ``height`` tell the
 geometry [pixels], ``adv2e`` (JSON) what wrote the file.  What is written here:
 
 ======================== =========================================
@@ -38,9 +38,9 @@ from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.files.npy import Header, read_array, read_header
 from adv2e.files.zips import open_member, zip_archive
-from adv2e.formats.column_names import SIZE_NAMES, find_columns, stated_unit
+from adv2e.formats.columns import SIZE_NAMES, find_columns, stated_unit
 from adv2e.formats.event_file import Columns, EventFile, Facts
-from adv2e.formats.sink import Request, Writer, to_json
+from adv2e.formats.writing import Request, Writer, to_json
 
 _BEYOND = 1 << 31
 _PART = 1 << 20  # events read at once
@@ -95,7 +95,8 @@ def open_npy(path: Path, facts: Facts) -> EventFile:
             read_header(file, path.stat().st_size, str(path))
             yield from _rows({"": (file, header.dtype)}, "", names, count, str(path))
 
-    header = _header(path)
+    with path.open("rb") as file:
+        header = read_header(file, path.stat().st_size, str(path))
     if header.dtype.names is None:
         raise DataError(
             f"{path}: numbers of shape {header.shape} without names, which may be frames; events"
@@ -106,19 +107,6 @@ def open_npy(path: Path, facts: Facts) -> EventFile:
         raise DataError(f"{path}: events must be in one dimension, not of shape {header.shape}")
     count = header.shape[0]
     return _file("npy", facts, names, count, rows, next(rows(), None))
-
-
-def is_array_of_events(path: Path) -> bool:
-    """Tell whether a ``.npy`` holds named fields, as stacks of frames do not."""
-    try:
-        return path.is_file() and _header(path).dtype.names is not None
-    except (OSError, DataError):  # for others to tell
-        return False
-
-
-def _header(path: Path) -> Header:
-    with path.open("rb") as file:
-        return read_header(file, path.stat().st_size, str(path))
 
 
 def _file(

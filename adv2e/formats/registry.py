@@ -32,7 +32,7 @@ class Format:
         With their dots; the empty one: a folder.
     reader, writer : str
         Where the function ``open(path, facts) -> EventFile`` is, and the subclass of
-        :class:`adv2e.formats.sink.Writer`: ``module:name`` below this package.  Empty: it cannot
+        :class:`adv2e.formats.writing.Writer`: ``module:name`` below this package.  Empty: it cannot
         be read, or written.
     magic : bytes
         How such a file begins, if always so.
@@ -114,29 +114,29 @@ FORMATS = (
     Format("ddd20", "HDF5 exported from DDD20", _HDF5, "ddd:open_exported",
            datasets=("event", "frame", "frame_ts"), frames="r", is_camera=True),
     Format("txt", "text, a line for each event: seconds, column, row, polarity", (".txt",),
-           "text.reader:open_text", "text.writer:TextWriter", holds_settings=False),
+           "text:open_text", "text_writer:TextWriter", holds_settings=False),
     Format("zip", "a DAVIS240C recording as a zip", (".zip",),
-           "davis240c.reader:open_davis240c", "davis240c.writer:ZipWriter",
+           "davis240c:open_davis240c", "davis240c:ZipWriter",
            magic=b"PK", frames="rw", is_camera=True),
     Format("folder", "a DAVIS240C recording as a folder", ("",),
-           "davis240c.reader:open_davis240c", "davis240c.writer:FolderWriter",
+           "davis240c:open_davis240c", "davis240c:FolderWriter",
            file="events.txt", frames="rw", is_camera=True),
     Format("e2vid", "text for rpg_e2vid, its first line the size; or a zip of it", (".txt", ".zip"),
-           "", "e2vid:E2vidWriter", holds_settings=False),
+           "", "davis240c:E2vidWriter", holds_settings=False),
     Format("aedat4", "AEDAT4 of iniVation's cameras", (".aedat4",),
-           "aedat4.reader:open_aedat4", "aedat4.writer:Aedat4Writer",
+           "aedat4:open_aedat4", "aedat4:Aedat4Writer",
            magic=b"#!AER-DAT4.0\r\n", frames="rw", is_camera=True, most=(32767, 32767),
            extra="aedat4"),
-    Format("bag", "a bag of ROS 1", (".bag",), "bag.reader:open_bag", "bag.writer:BagWriter",
+    Format("bag", "a bag of ROS 1", (".bag",), "bag:open_bag", "bag:BagWriter",
            magic=b"#ROSBAG V", frames="rw", is_camera=True, holds_settings=False,
            first_us=0, last_us=(1 << 32) * 1_000_000 - 1, extra="bag"),
     Format("ros2", "a bag of ROS 2, a folder", ("",),
-           "bag.reader:open_bag", "bag.writer:Ros2Writer",
+           "bag:open_bag", "bag:Ros2Writer",
            file="metadata.yaml", frames="rw", is_camera=True,
            first_us=0, last_us=(1 << 31) * 1_000_000 - 1, extra="bag"),
-    Format("mcap", "MCAP of ROS 2", (".mcap",), "bag.reader:open_bag",
+    Format("mcap", "MCAP of ROS 2", (".mcap",), "bag:open_bag",
            magic=b"\x89MCAP", frames="r", is_camera=True, extra="bag"),
-    Format("db3", "the database of a bag of ROS 2", (".db3",), "bag.reader:open_bag",
+    Format("db3", "the database of a bag of ROS 2", (".db3",), "bag:open_bag",
            magic=b"SQLite format 3", frames="r", is_camera=True, extra="bag"),
     Format("csv", "CSV with a heading", (".csv",), "csv:open_csv", "csv:CsvWriter",
            holds_settings=False, causes="csv:causes_of"),
@@ -154,7 +154,7 @@ FORMATS = (
     Format("dat", "DAT of Prophesee's cameras", (".dat",), "binary:open_dat", "binary:DatWriter",
            magic=b"%", is_camera=True, most=(1 << 14, 1 << 14),
            first_us=0, last_us=(1 << 32) - 1),
-    Format("nmnist", "N-MNIST and N-Caltech101", (".bin",), "nmnist:open_nmnist", is_camera=True),
+    Format("nmnist", "N-MNIST and N-Caltech101", (".bin",), "binary:open_nmnist", is_camera=True),
     Format("aedat2", "AEDAT-2.0 of jAER", (".aedat",), "aedat2:open_aedat2", "aedat2:Aedat2Writer",
            frames="r", is_camera=True, most=(1 << 10, 1 << 9),
            first_us=0, last_us=(1 << 31) - 1),
@@ -226,10 +226,20 @@ def may_hold_events(path: Path) -> bool:
         return any(found.file and (path / found.file).is_file() for found in readable)
     suffix = path.suffix.lower()
     if suffix == ".npy":
-        from adv2e.formats.npz import is_array_of_events  # noqa: PLC0415 - needs NumPy
-
-        return is_array_of_events(path)
+        return _has_fields(path)
     return bool(suffix) and any(suffix in found.suffixes for found in readable)
+
+
+def _has_fields(path: Path) -> bool:
+    """Tell whether a ``.npy`` holds named fields, as stacks of frames do not."""
+    from adv2e.files.npy import read_header  # noqa: PLC0415 - needs NumPy
+
+    try:
+        with path.open("rb") as file:
+            header = read_header(file, path.stat().st_size, str(path))
+    except (OSError, DataError):  # for others to tell
+        return False
+    return header.dtype.names is not None
 
 
 def format_of(path: Path) -> Format:
@@ -286,7 +296,7 @@ def _layout_of(path: Path, layouts: list[Format]) -> Format:
 
 _PICTURES_OF_EVENTS = (".mp4", ".webm", ".gif", ".avi", ".mkv", ".mov", ".png", ".jpg", ".jpeg")
 
-_STANDARD_OUTPUT = Format("txt", "text", (), writer="text.writer:StandardOutput")
+_STANDARD_OUTPUT = Format("txt", "text", (), writer="text_writer:StandardOutput")
 
 
 def _of_suffix(path: Path) -> Format:

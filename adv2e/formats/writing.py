@@ -11,21 +11,38 @@
 
 from __future__ import annotations
 
+import json
+import zlib
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adv2e import __version__
 from adv2e.background import default_threads
-from adv2e.causes import CAUSED_DTYPE, has_causes
-from adv2e.errors import DataError, warn
+from adv2e.causes import CAUSED_DTYPE, has_causes, without_causes
+from adv2e.errors import DataError, OutputError, UsageError, warn
 from adv2e.events import EVENT_DTYPE, Events, checked_events
-from adv2e.files.staging import Staging
+from adv2e.files.names import beside
+from adv2e.files.staging import Staging, writing
+from adv2e.formats import causes
 from adv2e.formats.causes import check_numbers
 from adv2e.formats.recording import Recording
-from adv2e.formats.registry import to_write
-from adv2e.formats.sink import Request, Sink
+from adv2e.formats.registry import Format, to_write
+
+try:
+    import deflate
+except ImportError:
+    PACKAGES: tuple[str, ...] = ()
+    """Packages that compress, beside the standard library."""
+else:
+    PACKAGES = ("deflate",)
 
 _NO_FRAMES = (
     "the frames of the recording are not written: 'adv2e convert IN -o OUT --from events"
@@ -169,3 +186,235 @@ def write_events(
         causes=caused,
     ) as sink:
         sink.write_events(ours)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """Output that was asked of :func:`adv2e.formats.writing.open_sink`: path, size, options."""
+
+    path: Path
+    width: int
+    height: int
+    description: dict[str, Any]
+    with_frames: bool
+    threads: int
+    causes: bool = False
+
+
+class Writer(ABC):
+    """Writes a format, files under their temporary names.
+
+    Parameters
+    ----------
+    request : Request
+    stack : ExitStack
+        Takes what is to be closed, however writing ends.
+    *temporary : Path
+        What :meth:`stage` returned.
+    """
+
+    @staticmethod
+    def stage(path: Path, staging: Staging) -> list[Path]:
+        """Return the temporary names of the files that make the output `path`."""
+        return [staging.file(path)]
+
+    @abstractmethod
+    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None: ...
+
+    @abstractmethod
+    def write_events(self, events: Events) -> None:
+        """Append events."""
+
+    def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
+        """Append a frame."""
+        raise NotImplementedError  # a format that takes frames says how
+
+    def finish(self) -> None:  # noqa: B027
+        """Write the remaining events and frames."""
+
+
+class Sink:
+    """Takes the events and frames of one recording, inside a ``with`` block.
+
+    Leaving the block normally finishes the output; an exception leaves no trace of it.
+
+    Parameters
+    ----------
+    format : Format
+        What is written.
+    request : Request
+    staging : Staging
+        Takes the files.
+    is_alone : bool
+        They come into place, or go, at the end of the sink; else with others of the `staging`.
+
+    Attributes
+    ----------
+    wants_frames : bool
+        Whether frames are stored; if not, they are ignored.
+    """
+
+    def __init__(
+        self, format: Format, request: Request, staging: Staging, *, is_alone: bool
+    ) -> None:
+        self.wants_frames = request.with_frames and "w" in format.frames
+        self._name = "standard output" if str(request.path) == "-" else str(request.path)
+        self._format = format
+        self._check_size(request.width, request.height)
+        writer = format.load(format.writer)
+        temporary = writer.stage(request.path, staging)
+        self._description = request.description
+        self._described: Path | None = None
+        if temporary and not format.holds_settings:
+            self._described = staging.file(beside(request.path, ".json"))
+        self._holds_causes = request.causes and format.causes != ""
+        self._causes = self._place_of_causes(request, staging, temporary)
+        told = replace(request, causes=self._holds_causes)
+        self._open = self._opened(partial(writer, told), staging, temporary, is_alone)
+
+    def _place_of_causes(
+        self, request: Request, staging: Staging, temporary: list[Path]
+    ) -> Path | None:
+        """Return the path of the causes beside the output; None: they are not written there."""
+        beside = causes.beside(request.path)
+        if request.causes and not self._holds_causes:
+            if not temporary:
+                raise UsageError("--causes: standard output has no place for them; give -o FILE")
+            return staging.file(beside)
+        if temporary and beside.exists():
+            raise OutputError(
+                f"{beside}: exists, and would be taken for the causes of these events: remove it,"
+                " or write them too (--causes)"
+            )
+        return None
+
+    def _check_size(self, width: int, height: int) -> None:
+        """Refuse a sensor that the format cannot name the pixels of."""
+        most = self._format.most
+        if width > most[0] or height > most[1]:
+            raise OutputError(
+                f"{self._name}: a sensor of {width}x{height} pixels does not fit"
+                f" {self._format.what}, which holds {most[0]}x{most[1]} at most; choose another"
+                " format, such as .h5"
+            )
+
+    def _check_time(self, t_us: int, what: str) -> None:
+        """Refuse a time [us] that would be wrapped or cut."""
+        first, last = self._format.first_us, self._format.last_us
+        if not first <= t_us <= last:
+            raise OutputError(
+                f"{self._name}: {what} at {t_us / 1e6:.6f} s does not fit"
+                f" {self._format.what}, which holds times from {first / 1e6:.6f} to"
+                f" {last / 1e6:.6f} s; --t0 zero may help, or another format, such as .h5"
+            )
+
+    @contextmanager
+    def _opened(
+        self,
+        writer: Callable[..., Writer],
+        staging: Staging,
+        temporary: list[Path],
+        is_alone: bool,
+    ) -> Iterator[Writer]:
+        with staging if is_alone else nullcontext(), _closing() as stack:
+            with writing(self._name):
+                staging.prepare()
+                if self._causes is not None:
+                    self._lines = stack.enter_context(self._causes.open("wb"))
+                made = writer(stack, *temporary)
+            yield made
+            with writing(self._name):
+                made.finish()
+                if self._described is not None:
+                    text = to_json(self._description)
+                    self._described.write_text(text, encoding="utf-8", newline="\n")
+                stack.close()
+
+    def write_events(self, events: Events) -> None:
+        """Append events; over all calls they are sorted by time.
+
+        Raises
+        ------
+        OutputError
+            They cannot be written, as when the disk is full, or do not fit the format.
+        BrokenPipeError
+            They go to standard output, and nobody reads them any more.
+        """
+        if events.size:
+            for t in (int(events["t"][0]), int(events["t"][-1])):
+                self._check_time(t, "an event")
+        with writing(self._name):
+            if self._causes is not None:
+                self._lines.write(causes.lines_of(events["cause"]))
+            self._writer.write_events(events if self._holds_causes else without_causes(events))
+
+    def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
+        """Append a frame taken at `t_ns` [ns]; over all calls sorted by time.
+
+        `image` is uint8 or uint16, (rows, columns) or (rows, columns, 3) in RGB.  It may come
+        long before the events around it.
+        """
+        if self.wants_frames:
+            for t in (t_ns // 1000, (t_ns + 500) // 1000):  # formats round, or keep the rest
+                self._check_time(t, "a frame")
+            with writing(self._name):
+                self._writer.write_frame(t_ns, image)
+
+    def describe(self, **more: Any) -> None:
+        """Add to the description what is known only at the end.
+
+        Formats that begin with it do not hold that: AEDAT, bags of ROS 2, and .raw and .dat.
+        """
+        self._description.update(more)
+
+    def __enter__(self) -> Sink:
+        self._writer = self._open.__enter__()
+        return self
+
+    def __exit__(self, *raised: Any) -> None:
+        self._open.__exit__(*raised)
+
+
+@contextmanager
+def _closing() -> Iterator[ExitStack]:
+    """Give a stack for files; where the body raises, what closing them says is of no interest."""
+    stack = ExitStack()
+    try:
+        yield stack
+    except BaseException:
+        with suppress(Exception):
+            stack.close()
+        raise
+    stack.close()
+
+
+def to_json(description: dict[str, Any]) -> str:
+    """Return the description as text, the same for the same content, and fit for UTF-8."""
+    text = json.dumps(description, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def to_line(description: dict[str, Any]) -> str:
+    """Return the description as one line of ASCII."""
+    return json.dumps(json.loads(to_json(description)))
+
+
+def compress(array: NDArray[Any]) -> bytes:
+    """Return the bytes of an array as deflate leaves them: libdeflate's, where it is installed.
+
+    What libdeflate or zlib writes any inflate reads; how many bytes it takes differs.  Either gives
+    the same bytes for the same data, which not every library does: ISA-L, several times faster,
+    does not always.
+    """
+    data = np.ascontiguousarray(array).data
+    if PACKAGES:
+        return bytes(deflate.zlib_compress(data, 1))
+    return zlib.compress(data, 1)
+
+
+def compress_shuffled(values: NDArray[Any]) -> bytes:
+    """Return the bytes of values as HDF5's filters shuffle and deflate leave them.
+
+    Bytes of equal rank go together.
+    """
+    return compress(np.ascontiguousarray(values).view(np.uint8).reshape(values.size, -1).T)

@@ -179,8 +179,8 @@ def _resident_mib() -> float:
 READERS = """
 cli.info cli.convert cli.render cli.compare cli.config cli.characterise inspection.inspect
 inspection.report rendering comparison.compare comparison.report diagnosis.tables.characterise
-formats.hdf5_layouts formats.npz formats.hdf5 formats.ddd formats.text.reader
-formats.davis240c.reader conversion.pipeline conversion.simulation
+formats.hdf5_layouts formats.npz formats.hdf5 formats.ddd formats.text formats.davis240c
+conversion.pipeline conversion.simulation
 sources.video.source sources.images.source sources.npy sources.davis240c
 """
 """Modules that are imported before processes are copied."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from adv2e.events import make_events, sort_events
-from adv2e.formats.text.writer import text_blocks
+from adv2e.formats.text_writer import text_blocks
 from adv2e.formats.writing import open_sink
 
 COUNT = 300_000

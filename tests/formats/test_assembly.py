@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.formats.assembly import assemble
 from adv2e.formats.event_file import EventFile, Facts
+from adv2e.formats.reading import assemble
 
 
 def built(rows, geometry=(10, 10), parts=1, **said):

@@ -5,14 +5,13 @@ import numpy as np
 import pytest
 
 from adv2e.events import make_events
-from adv2e.formats import compression
-from adv2e.formats.compression import compress, compress_shuffled
-from adv2e.formats.writing import open_sink
+from adv2e.formats import writing
+from adv2e.formats.writing import compress, compress_shuffled, open_sink
 
 
 @pytest.fixture(params=["deflate", "zlib"])
 def packages(request, monkeypatch):
-    monkeypatch.setattr(compression, "PACKAGES", ("deflate",) if request.param == "deflate" else ())
+    monkeypatch.setattr(writing, "PACKAGES", ("deflate",) if request.param == "deflate" else ())
 
 
 @pytest.mark.parametrize("dtype", [np.bool_, np.int16, np.float64])
@@ -44,8 +43,8 @@ def test_datasets_do_not_depend_on_what_compresses(tmp_path, monkeypatch):
             sets = {**file["events"], **file["images"]}
             return {name: sets[name][()].tobytes() for name in sets}
 
-    assert compression.PACKAGES == ("deflate",)  # of the extra `test`
+    assert writing.PACKAGES == ("deflate",)  # of the extra `test`
     fast = written("fast.h5")
-    monkeypatch.setattr(compression, "PACKAGES", ())
+    monkeypatch.setattr(writing, "PACKAGES", ())
     assert written("standard.h5") == fast
     assert len(fast) == 5

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adv2e.formats.units import event_unit
+from adv2e.formats.columns import event_unit
 from adv2e.sources.times.units import UNITS, Unit
 
 UNIT = st.sampled_from(list(UNITS))

@@ -49,6 +49,14 @@ def test_all_layouts_are_here():
     assert WITH_FRAMES == ["monash", "v2e", "mvsec"]
 
 
+def test_a_layout_is_known_by_the_datasets_that_are_read():
+    here = [found for found in FORMATS if found.reader.startswith("hdf5_layouts:")]
+    assert len(here) == len(layouts()) + 1
+    for found in here:
+        layout = found.load(found.reader).__self__
+        assert (layout.name, layout.datasets) == (found.name, list(found.datasets))
+
+
 @every
 @pytest.mark.parametrize("begin", [0, 1 << 24, (1 << 32) + 1, EPOCH_US])
 def test_corners_come_back_or_are_refused(tmp_path, layout, begin):

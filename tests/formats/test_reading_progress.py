@@ -6,9 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
-from adv2e.formats import hdf5, npz
+from adv2e.formats import hdf5, npz, text
 from adv2e.formats.reading import read_events
-from adv2e.formats.text import reader as text
 
 LINES = "".join(f"{0.001 * k:.9f} {k % 8} {k % 6} {k % 2}\n" for k in range(1000))
 

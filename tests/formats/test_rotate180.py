@@ -7,7 +7,7 @@ from adv2e import convert, write_events
 from adv2e.errors import DataError
 from adv2e.events import make_events, sort_events
 from adv2e.formats.frames import open_frames
-from adv2e.formats.reading import open_events, read_events
+from adv2e.formats.reading import read_events
 from adv2e.formats.writing import open_sink
 
 EVENTS = make_events([0, 10, 10, 30_000], [0, 3, 1, 2], [0, 2, 1, 0], [1, 0, 0, 1])
@@ -59,8 +59,8 @@ def test_without_a_size_nothing_can_be_turned(tmp_path):
     (tmp_path / "a.txt.json").unlink()
     with pytest.raises(DataError, match=r"a\.txt: states no size of its sensor, which --rotate180"):
         read_events(tmp_path / "a.txt", rotate180=True)
-    parts = list(open_events(tmp_path / "a.txt", size=(4, 3), rotate180=True).parts())
-    assert parts[0][1].tolist() == [3, 0, 2, 1]
+    recording = read_events(tmp_path / "a.txt", size=(4, 3), rotate180=True)
+    assert recording.events["x"].tolist() == [3, 0, 2, 1]
 
 
 def test_commands_turn_too(tmp_path, adv2e):

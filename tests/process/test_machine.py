@@ -48,7 +48,7 @@ def test_readers_leave_it_as_it_is(tmp_path, monkeypatch, suffix, error):
 
     path = tmp_path / f"a{suffix}"
     path.write_text("PK" if suffix in (".npz", ".zip") else "0.1 1 1 1\n")
-    for name in ("zipfile.ZipFile", "h5py.File", "adv2e.formats.text.reader.parse_lines"):
+    for name in ("zipfile.ZipFile", "h5py.File", "adv2e.formats.text.parse_lines"):
         monkeypatch.setattr(name, fail)
     with pytest.raises(type(error), match=str(error)):
         read_events(path)

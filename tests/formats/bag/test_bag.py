@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from adv2e.errors import DataError, MissingExtraError, OutputError
 from adv2e.events import make_events, sort_events
-from adv2e.formats.bag.messages import EVENT_ARRAY, EVENT_ARRAY_TEXT, EVENT_TEXT
+from adv2e.formats.bag import EVENT_ARRAY, EVENT_ARRAY_TEXT, EVENT_TEXT
 from adv2e.formats.frames import open_frames
 from adv2e.formats.reading import open_events, read_events
 from adv2e.formats.writing import open_sink

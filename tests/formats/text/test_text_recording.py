@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from adv2e.errors import DataError
 from adv2e.formats.reading import read_events
-from adv2e.formats.text.lines import parse_lines
+from adv2e.formats.text import parse_lines
 
 
 @pytest.fixture

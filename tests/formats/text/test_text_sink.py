@@ -10,7 +10,7 @@ import pytest
 
 from adv2e.errors import OutputError, UsageError
 from adv2e.events import empty_events, make_events
-from adv2e.formats.text.writer import text_blocks
+from adv2e.formats.text_writer import text_blocks
 from adv2e.formats.writing import open_sink
 
 METADATA = {"adv2e": "1.2.3", "config": {"seed": 5}, "seed": 5}
@@ -164,7 +164,7 @@ def test_standard_output_takes_text_only(options):
 
 def test_kernel_runs_without_compilation():
     code = (
-        "from adv2e.events import make_events; from adv2e.formats.text.writer import text_blocks;"
+        "from adv2e.events import make_events; from adv2e.formats.text_writer import text_blocks;"
         "events = make_events([-5, 1_500_000], [0, 345], [10, 259], [1, 0]);"
         "print(b''.join(map(bytes, text_blocks(events))).decode(), end='')"
     )

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from adv2e.compiled import kernel
 from adv2e.events import EVENT_DTYPE, Events
 from adv2e.files.staging import Staging
-from adv2e.formats.sink import Request, Writer
+from adv2e.formats.writing import Request, Writer
 
 _BLOCK = 1 << 15  # events formatted at once
 _LONGEST = 48  # bytes of the longest line, and what the kernel may write beyond its end

@@ -1,18 +1,30 @@
-"""The layout of the Event-Camera Dataset (DAVIS240C), as a folder or a zip archive.
+"""Recordings in the layout of the Event-Camera Dataset (DAVIS240C): a folder or its zip.
 
 ======================== ========================================================================
-events.txt               ``seconds x y polarity``, see :mod:`adv2e.formats.text.writer`
+events.txt               ``seconds x y polarity``, see :mod:`adv2e.formats.text`
 images.txt               ``seconds images/frame_%08d.png``, a line for each frame stored
 images/frame_%08d.png    frames, counted from 0, 8 or 16 bit as given
 adv2e.json               version, geometry, configuration, seed
 ======================== ========================================================================
 
-An archive holds these at its root.
+An archive that is written holds these at its root; one that is read may hold them in one folder.
+
+What rpg_e2vid and its descendants read is written, too: text with a heading, or a zip of it alone,
+which is read as text.
+
+============ ==================================================
+first line   ``width height``, which these programs skip
+other lines  ``seconds x y polarity``, polarity 0 (OFF) or 1 (ON)
+============ ==================================================
+
+Without the first line they would lose the first event, and refuse a zip of more than one file.
 
 References
 ----------
 .. [1] E. Mueggler, H. Rebecq, G. Gallego, T. Delbruck, D. Scaramuzza, "The event-camera dataset and
    simulator", IJRR 36(2), 2017, doi:10.1177/0278364917691115.
+.. [2] H. Rebecq et al., "High speed and high dynamic range video with an event camera", TPAMI 2019,
+   arXiv:1906.07165; github.com/uzh-rpg/rpg_e2vid: utils/event_readers.py.
 """
 
 from __future__ import annotations
@@ -20,21 +32,96 @@ from __future__ import annotations
 import zipfile
 from abc import abstractmethod
 from contextlib import ExitStack, closing
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.background import OrderedWork
+from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.files.backlog import Backlog
+from adv2e.files.names import beside
 from adv2e.files.staging import Staging
-from adv2e.formats.sink import Request, Writer, to_json
-from adv2e.formats.text.writer import text_blocks
+from adv2e.files.zips import Members
+from adv2e.formats.event_file import EventFile, Facts
+from adv2e.formats.text import lines_of
+from adv2e.formats.text_writer import text_blocks
+from adv2e.formats.writing import Request, Writer, to_json
+from adv2e.sources.frame import Pixels, Shot
+from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST
+from adv2e.sources.times.lists import FrameList, decoded, has_lines, members_of, parse_list
 from adv2e.sources.times.rates import NS_PER_S
+
+
+def open_davis240c(path: Path, facts: Facts) -> EventFile:
+    """Open the recording in a folder or zip.
+
+    Raises
+    ------
+    DataError
+        No ``events.txt`` in it, a line that cannot be read, or an image that is listed is missing;
+        a zip that cannot be read.
+    """
+    files = Members(path)
+    if path.is_dir():
+        if not files.has(EVENTS):
+            raise DataError(f"{path}: no {EVENTS} in it; a folder must be a DAVIS240C recording")
+        name = EVENTS
+    else:
+        found = files.enter(EVENTS) or files.enter("*.txt")
+        if len(found) != 1:
+            raise DataError(
+                f"{path}: must hold one {EVENTS}, at its root or in one folder, or a single text"
+                " file"
+            )
+        (name,) = found
+    if files.has(DESCRIPTION):
+        text = files.read(DESCRIPTION).decode("utf-8-sig", "replace")
+        facts.describe(text, files.label(DESCRIPTION), DESCRIPTION)
+    elif not path.is_dir() and (described := beside(path, ".json")).is_file():
+        facts.describe_from(described)  # a zip for rpg_e2vid holds nothing but events
+    facts.inputs += map(files.label, (name, LIST, DESCRIPTION))
+    listed = _listed(files, stated=facts.stated_unit)
+    if listed is not None and len(listed.stamps) > 1:
+        facts.note_frames(listed.unit, whole=listed.whole)
+    if facts.geometry is None and listed is not None:
+        first = members_of(listed.stamps[:1], files.label(LIST), files.has)[0]
+        rows, columns = decode_image(files.read(first), files.label(first)).image.shape[:2]
+        facts.state((columns, rows), first)
+    label = files.label(name)
+    header = f"the first line of {name}"
+    text_file = lines_of(lambda: files.open(name), files.size(name), label, facts, header)
+    if listed is None:
+        return replace(text_file, layout="davis240c" if name == EVENTS else "text")
+    if unit := facts.unit_of_frames(whole=listed.whole):
+        listed = _listed(files, time_unit=unit) or listed
+    facts.problems += [f"{LIST}: {line}" for line in (listed.unit.doubt, listed.order) if line]
+    names = members_of(listed.stamps, files.label(LIST), files.has)
+    shots = [
+        Shot(stamp.t_ns, files.label(member), partial(_image, files, member))
+        for stamp, member in zip(listed.stamps, names, strict=True)
+    ]
+    return replace(text_file, layout="davis240c", shots=lambda: iter(shots))
+
+
+def _image(files: Members, name: str) -> Pixels:
+    return decode_image(files.read(name), files.label(name))
+
+
+def _listed(files: Members, **evidence: Any) -> FrameList | None:
+    """Return the list of frames, or None without frames."""
+    if not files.has(LIST):
+        return None
+    label = files.label(LIST)
+    text = decoded(files.read(LIST), label)
+    return parse_list(text, label, **evidence) if has_lines(text) else None
+
 
 _BLOCK = 1 << 20  # bytes of text deflated at once: the archive must not depend on who calls how
 _LEVEL = 4  # of deflate: a fifth more bytes than level 6, in a third of its time
@@ -169,3 +256,32 @@ class ZipWriter(_Davis240cWriter):
         info.compress_type = method
         info.external_attr = 0o644 << 16
         self._archive.writestr(info, data)
+
+
+class E2vidWriter(Writer):
+    """Writes the text, or, to a path that ends in ``.zip``, a zip that holds it alone."""
+
+    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
+        (path,) = temporary
+        self._file: IO[bytes]
+        if request.path.suffix.lower() == ".zip":
+            archive = stack.enter_context(
+                zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL)
+            )
+            name = f"{request.path.stem}.txt"
+            self._file = stack.enter_context(archive.open(name, "w", force_zip64=True))
+        else:
+            self._file = stack.enter_context(path.open("wb"))
+        self._text = bytearray(f"{request.width} {request.height}\n".encode())
+
+    def write_events(self, events: Events) -> None:
+        """Append events."""
+        for block in text_blocks(events):
+            self._text += block
+            while len(self._text) >= _BLOCK:
+                self._file.write(self._text[:_BLOCK])
+                del self._text[:_BLOCK]
+
+    def finish(self) -> None:
+        """Write the remaining lines."""
+        self._file.write(self._text)

@@ -1,1 +1,0 @@
-"""AEDAT4, the format of iniVation's DV, jAER's successor, for events and frames."""

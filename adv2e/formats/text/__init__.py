@@ -1,1 +1,0 @@
-"""Events as text, one a line."""
