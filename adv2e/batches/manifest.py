@@ -24,9 +24,8 @@ from types import TracebackType
 from typing import Any, BinaryIO
 
 from adv2e.errors import DataError, OutputError
-from adv2e.files.locks import lock_file, unlock_file
 from adv2e.files.regular import check_ends
-from adv2e.files.workspace import sync_one
+from adv2e.files.workspace import lock_file, sync_one, unlock_file
 
 _FORM: dict[str, type] = {
     **dict.fromkeys(("name", "status", "at", "adv2e", "settings", "output"), str),

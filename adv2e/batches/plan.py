@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from adv2e import __version__
-from adv2e.batches.exports import Export
 from adv2e.batches.sequences import Sequence as Found
+from adv2e.batches.work import Export
 from adv2e.errors import UsageError
 from adv2e.files.states import State, digest_of
 

@@ -27,7 +27,7 @@ from typing import Any
 import adv2e
 from adv2e.batches.work import Job, do
 from adv2e.files.workspace import remove_abandoned
-from adv2e.process import cleanup
+from adv2e.process import signals
 from adv2e.process.signals import Terminated, stop_on_signals
 from adv2e.process.standard_error import keep_errors_for_ourselves
 
@@ -99,7 +99,7 @@ def run(jobs: Iterable[Job], count: int) -> Iterator[tuple[Job, dict[str, Any]]]
     """
     workers = Workers(count)
     pool = ThreadPoolExecutor(count)
-    cleanup.add(workers)
+    signals.add(workers)
     try:
         coming = iter(jobs)
         flying: dict[Future[dict[str, Any]], Job] = {}
@@ -119,10 +119,10 @@ def run(jobs: Iterable[Job], count: int) -> Iterator[tuple[Job, dict[str, Any]]]
         workers.remove_now()
         pool.shutdown()
         workers.close()
-        cleanup.drop(workers)
+        signals.drop(workers)
 
 
-class Workers(cleanup.Unfinished):
+class Workers(signals.Unfinished):
     """Processes, each of which does one job after the other.
 
     Parameters

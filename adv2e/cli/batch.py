@@ -8,7 +8,7 @@ import click
 
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
-from adv2e.files.names import shown
+from adv2e.files.regular import shown
 from adv2e.formats import registry
 from adv2e.options import BatchOptions, size_of
 

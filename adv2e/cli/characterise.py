@@ -83,7 +83,7 @@ def command(
     from adv2e.diagnosis.tables.characterise import characterise
     from adv2e.diagnosis.tables.problem import Settings, read_declared
     from adv2e.diagnosis.tables.table import read_table
-    from adv2e.files.names import shown
+    from adv2e.files.regular import shown
     from adv2e.reports.files import check_folder, write_reports
     from adv2e.reports.summary import details_text, summary_text
 

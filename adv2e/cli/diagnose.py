@@ -61,7 +61,7 @@ def command(
 
     from adv2e.config import names_of, written_keys
     from adv2e.diagnosis.recordings import diagnose_file
-    from adv2e.files.names import shown
+    from adv2e.files.regular import shown
     from adv2e.reports.summary import summary_text
 
     declared = config(given["size"])

@@ -30,7 +30,7 @@ from typing import TextIO
 import click
 
 from adv2e.errors import Adv2eError, Adv2eWarning, is_for_users
-from adv2e.files.names import shown
+from adv2e.files.regular import shown
 from adv2e.process.machine import machine_complaint
 from adv2e.process.signals import Terminated, last_words
 

@@ -21,7 +21,7 @@ import click
 from adv2e.cli import completion
 from adv2e.cli.exit_status import VERBOSITY
 from adv2e.cli.progress import compilation_told
-from adv2e.files.names import shown
+from adv2e.files.regular import shown
 from adv2e.geometry import parse_rectangle, parse_size
 from adv2e.options import BAYER, Option, Run, declared
 

@@ -25,8 +25,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from adv2e.files.locks import lock_file, unlock_file
-from adv2e.files.workspace import is_ours
+from adv2e.files.workspace import is_ours, lock_file, unlock_file
 
 _UNUSED_S = 30 * 24 * 3600.0
 _USE_NOTED_S = 24 * 3600.0

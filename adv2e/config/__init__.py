@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from adv2e.config.build import Key, all_keys, build, keys_of
 from adv2e.config.distributions import Distributions, Number, replaced
-from adv2e.config.files import find, read, shipped
-from adv2e.config.forms import form_text
+from adv2e.config.files import find, read, shipped, to_annotated_yaml, to_dict, to_yaml
 from adv2e.config.model import Config
-from adv2e.config.text import to_annotated_yaml, to_dict, to_yaml
-from adv2e.config.tree import merge, parse_set
+from adv2e.config.tree import form_text, merge, parse_set
 from adv2e.config.user_effects import config_class, user_effects
 from adv2e.config.yaml12 import Origin, Value, key_text
 from adv2e.errors import ConfigError
-from adv2e.files.names import shown
+from adv2e.files.regular import shown
 
 if TYPE_CHECKING:
     from adv2e.effects.hooks import Hooks

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from dataclasses import MISSING
 from typing import Any, TypeVar
 
-from adv2e.config.forms import form_text, is_form
 from adv2e.config.model import Config
+from adv2e.config.tree import form_text, is_form
 from adv2e.config.yaml12 import Value, scalar_text
 from adv2e.errors import Adv2eError, ConfigError
 from adv2e.parameters import Parameter, Section, kinds_of

@@ -27,7 +27,7 @@ from dataclasses import MISSING, dataclass
 from typing import Any, TypeAlias
 
 from adv2e.config.build import Key, keys_of, parts_of
-from adv2e.config.forms import LAWS, TIE, form_text
+from adv2e.config.tree import LAWS, TIE, form_text
 from adv2e.config.yaml12 import Value
 from adv2e.errors import Adv2eError
 from adv2e.parameters import Section

@@ -24,8 +24,7 @@ from adv2e.config.model import Config
 from adv2e.effects import STAGES
 from adv2e.effects.hooks import Hooks
 from adv2e.errors import ConfigError
-from adv2e.files.names import shown
-from adv2e.files.regular import read_text_bytes
+from adv2e.files.regular import read_text_bytes, shown
 from adv2e.parameters import Section, subsection
 
 if TYPE_CHECKING:

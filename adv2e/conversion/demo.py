@@ -15,15 +15,14 @@ from adv2e.conversion.pipeline import Summary, convert_reading
 from adv2e.conversion.reading import Reading
 from adv2e.conversion.simulation import simulate
 from adv2e.errors import OutputError
-from adv2e.files.names import shown
+from adv2e.files.regular import shown
 from adv2e.files.staging import Staging
 from adv2e.formats.reading import read_events
 from adv2e.formats.writing import open_sink
 from adv2e.rendering import Style, render_recording
 from adv2e.rendering.timeline import caption
 from adv2e.synthetic import Scene
-from adv2e.synthetic.clips import frame_times, write_video
-from adv2e.synthetic.scene import RAMP_S
+from adv2e.synthetic.scene import RAMP_S, frame_times, write_video
 
 if TYPE_CHECKING:
     from adv2e.config import Config

@@ -7,10 +7,13 @@ With one thread, that one does everything.
 
 from __future__ import annotations
 
+import platform
 import time
+import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,18 +27,16 @@ from adv2e.config import Config, to_dict
 from adv2e.config.active_effects import active_hooks, user_sources
 from adv2e.conversion.reading import Decoding, Reading, Still
 from adv2e.conversion.simulation import events_from_light
-from adv2e.conversion.versions import versions
 from adv2e.effects.frames.brightness import check_white
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.events import Events
-from adv2e.files.names import shown
+from adv2e.files.regular import shown
 from adv2e.files.staging import Staging
 from adv2e.formats.registry import check_frames, to_write
 from adv2e.formats.writing import PACKAGES, Sink, open_sink
 from adv2e.geometry import Size
-from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.interpolation import network_of
-from adv2e.light.pictures import drawn, picture_white
+from adv2e.light.pictures import decoder_for, drawn, kernel_table, light_text, picture_white
 from adv2e.light.sensor import fitting_of
 from adv2e.options import SimulatedOutput, takes
 from adv2e.process import bars
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 
     from adv2e.light.sensor import Fitting
     from adv2e.rendering.timeline import Timeline
+
 
 BEHIND_BYTES = 16 << 20
 """Memory for events and frames that were made and not written yet."""
@@ -388,3 +390,40 @@ def _shown(
             del still  # with its picture
 
     return counted()
+
+
+# ---- Versions of what computes events, stored with them: the same bytes are promised for the
+# same.
+
+
+_OPENCV = (
+    *("opencv-python-headless", "opencv-python"),
+    *("opencv-contrib-python-headless", "opencv-contrib-python"),
+)
+"""Packages that bring cv2, of which any does."""
+
+
+def versions(optional: Iterable[str] = ()) -> dict[str, str | None]:
+    """Return the version of Python and of each package; None for what has none.
+
+    Parameters
+    ----------
+    optional : iterable of str
+        Optional packages that take part, by the names under which they are installed.
+    """
+    opencv = next((found for name in _OPENCV if (found := _version(name))), None)
+    return {
+        "python": platform.python_version(),
+        "numpy": _version("numpy"),
+        "numba": _version("numba"),
+        "opencv": opencv,
+        "zlib": zlib.ZLIB_RUNTIME_VERSION,
+        **{name: _version(name) for name in optional},
+    }
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None

@@ -22,8 +22,8 @@ from adv2e.effects.hooks import Frames, Hooks
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.errors import DataError, UsageError, warn
 from adv2e.events import Events, empty_events
-from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.intervals import Intervals
+from adv2e.light.pictures import decoder_for, kernel_table, light_text
 from adv2e.light.sensor import fitting_of
 from adv2e.pixel.array import PixelArray
 from adv2e.pixel.steps import PRECISE, Coarseness
@@ -272,7 +272,7 @@ def events_from_light(
     """Yield the events of a sequence of (t_ns, light [DN]), sorted, chunk by chunk.
 
     `hooks` are the effects that are on, in signal order; default: those of `config`.  With a
-    `table` (:func:`adv2e.light.decoding.kernel_table`), the frames are grey values of 8 bits that
+    `table` (:func:`adv2e.light.pictures.kernel_table`), the frames are grey values of 8 bits that
     it decodes.  `method`, `coarseness`, `causes`: see :class:`adv2e.pixel.array.PixelArray`.
     `complete` is called now and then with a time [us] before which no event will come any more; not
     so if effects change events, as they may change times.

@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 
 from adv2e import __version__
 from adv2e.causes import CAUSES
-from adv2e.conversion.pipeline import Summary
-from adv2e.conversion.versions import versions
+from adv2e.conversion.pipeline import Summary, versions
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.errors import DataError
 from adv2e.events import Events
-from adv2e.files.names import shown
+from adv2e.files.regular import shown
 from adv2e.files.staging import Staging
 from adv2e.formats.event_file import EventFile, Progress
 from adv2e.formats.reading import events_in_order, inside, open_events
@@ -34,8 +33,8 @@ from adv2e.geometry import Rectangle
 from adv2e.light.pictures import picture_of, picture_white
 from adv2e.options import CopyOptions, EventInput, chosen, crop_of, takes
 from adv2e.process import bars
+from adv2e.sources.base import Selection
 from adv2e.sources.frame import Light, Pixels
-from adv2e.sources.wanted import Selection
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

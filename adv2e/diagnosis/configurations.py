@@ -14,7 +14,7 @@ from adv2e.config.tree import get_key, set_key
 from adv2e.config.user_effects import user_effects
 from adv2e.effects.readout.frame_coupling import FrameCoupling
 from adv2e.errors import ConfigError
-from adv2e.reports.keys import Own, known_keys
+from adv2e.reports.markup import Own, known_keys
 
 
 def with_keys(config: Config, keys: Mapping[str, Any]) -> Config:

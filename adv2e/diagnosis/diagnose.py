@@ -18,8 +18,7 @@ from adv2e.diagnosis.configurations import (
     own_of,
 )
 from adv2e.diagnosis.data.evidence import Evidence
-from adv2e.diagnosis.fitting.nuisances import thresholds_of
-from adv2e.diagnosis.outcome.detectable import detectable
+from adv2e.diagnosis.fitting.fitter import thresholds_of
 from adv2e.diagnosis.outcome.findings import (
     about_drifts,
     about_frames,
@@ -27,7 +26,7 @@ from adv2e.diagnosis.outcome.findings import (
     rejected_of,
     signatures_of,
 )
-from adv2e.diagnosis.outcome.verdict import conclude, remark_of
+from adv2e.diagnosis.outcome.verdict import conclude, detectable, remark_of
 from adv2e.diagnosis.prepare import DECLARED, prepare
 from adv2e.diagnosis.selection.search import Search
 from adv2e.diagnosis.simulation.affordable import affordable

@@ -31,7 +31,7 @@ from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.tables.table import Table, read_table
 from adv2e.effects.frames.brightness import BRIGHTEST
 from adv2e.errors import DataError
-from adv2e.files.names import shown
+from adv2e.files.regular import shown
 from adv2e.formats.reading import assemble, open_events
 from adv2e.geometry import Rectangle, Size, parse_rectangle
 from adv2e.light.sensor import check_beside

@@ -14,13 +14,13 @@ from adv2e.diagnosis.data.input_checks import check_inputs, check_known_light
 from adv2e.diagnosis.data.scene import Placed, Scene
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.fitting.candidates import NOTHING, Candidate
-from adv2e.diagnosis.fitting.library import library, of_known_light
-from adv2e.diagnosis.fitting.nuisances import (
+from adv2e.diagnosis.fitting.fitter import (
     TOLERANCE,
     fit_thresholds,
     threshold_nuisance,
     thresholds_of,
 )
+from adv2e.diagnosis.fitting.library import library, of_known_light
 from adv2e.diagnosis.hints.collect import hints_of, looked_at_by
 from adv2e.diagnosis.hints.own_period import own_period_of
 from adv2e.diagnosis.hints.readouts import has_pulse

@@ -2,7 +2,7 @@
 
 ====================================== ========================================================
 events/SPLIT/NAME_export_%d.npy        float32, (rows, columns, 6): see
-                                       :mod:`adv2e.representations.event_images`
+                                       :mod:`adv2e.representations.voxel_grid`
 images/SPLIT/NAME_export_%d.png        the image at the end of the window, grey, 8 bits
 ====================================== ========================================================
 
@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.exporting.windows import Slice
-from adv2e.representations.event_images import event_image
+from adv2e.representations.voxel_grid import event_image
 
 DDD17 = (346, 260)
 """Columns and rows of the camera of DDD17."""
@@ -45,7 +45,7 @@ class SegmentationSettings:
     rows : int or None
         Rows that are kept, from the top; None: 200 of the 260 of DDD17's camera, else all.
     scale_counts : bool
-        See :func:`adv2e.representations.event_images.event_image`.
+        See :func:`adv2e.representations.voxel_grid.event_image`.
     """
 
     split: str = "train"

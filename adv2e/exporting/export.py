@@ -22,7 +22,7 @@ from adv2e.exporting.windows import (
     by_count,
     by_time,
 )
-from adv2e.files.names import shown
+from adv2e.files.regular import shown
 from adv2e.files.staging import Staging, writing
 from adv2e.formats.reading import events_in_order
 from adv2e.in_python import in_python

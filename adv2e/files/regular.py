@@ -7,9 +7,10 @@ descriptors that are open already; there somebody writes, and it is read to its 
 from __future__ import annotations
 
 import os
+import re
 import stat
 from pathlib import Path
-from typing import BinaryIO, cast
+from typing import Any, BinaryIO, cast
 
 from adv2e.errors import Adv2eError, DataError
 
@@ -82,3 +83,92 @@ def _is_open_already(path: Path) -> bool:
         return True
     folder = os.path.realpath(path.parent)
     return folder == "/dev/fd" or (folder.startswith("/proc/") and folder.endswith("/fd"))
+
+
+# ---- Decompression bombs: limit of the growth of compressed data when they are read.
+#
+# Deflate packs a thousand zeros into one byte, and HDF5 a whole dataset of them into none. Data
+# that are read into memory at once must not grow so, whoever wrote the file; recordings and images
+# are compressed to a tenth, a picture of one colour to a hundredth.
+
+
+FREE = 64 << 20
+"""Uncompressed size up to which any growth is allowed [bytes]."""
+
+MOST = 200
+"""Largest growth: uncompressed bytes for one byte of a file."""
+
+
+def check_expansion(stated: int, held: int, label: str) -> None:
+    """Raise DataError if the stated size exceeds both 64 MiB and 200 times the bytes held."""
+    if stated > FREE and stated > MOST * held:
+        raise DataError(
+            f"{label}: states {stated:,} bytes and holds {held:,}; what grows more than"
+            f" {MOST}-fold is not read: damaged, or made to fill the memory"
+        )
+
+
+def expand(reader: Any, data: bytes, label: str, errors: tuple[type[Exception], ...]) -> bytes:
+    """Return the uncompressed data, if they grow no further than is allowed.
+
+    Parameters
+    ----------
+    reader : decompressor
+        As those of :mod:`bz2` are, not used yet.
+    data : bytes
+    label : str
+        Name of the data, for messages.
+    errors : tuple of exceptions
+        Exceptions of the reader for damaged data.
+
+    Raises
+    ------
+    DataError
+        The data are damaged, cut short, or grow more than 200-fold beyond 64 MiB.
+    """
+    most = max(FREE, MOST * len(data))
+    try:
+        plain: bytes = reader.decompress(data, max_length=most)
+    except errors as failed:
+        raise DataError(f"{label}: cannot be uncompressed: {failed}") from failed
+    if not reader.eof:
+        how = f"grows more than {MOST}-fold" if len(plain) >= most else "is cut short"
+        raise DataError(f"{label}: cannot be uncompressed: it {how}")
+    return plain
+
+
+# ---- Names of files as they are shown and stored: any name that a file system allows, on one
+# line.
+#
+# A name may hold bytes that are not UTF-8, which Python keeps as lone surrogates, and control
+# characters, line breaks among them. Neither can be printed or stored as they are: many readers
+# refuse the first, and terminals obey the second. A file is always opened by its name as it is;
+# what people or other programs are to read goes through :func:`shown`.
+
+
+_UNFIT = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
+
+
+def shown(name: str | Path) -> str:
+    r"""Return a name, or a line that holds names, with escapes for what cannot be shown.
+
+    A byte that is not UTF-8 reads ``\xff``, a line break ``\n``.
+
+    >>> shown("two\nlines")
+    'two\\nlines'
+    """
+    return _UNFIT.sub(_escape, str(name))
+
+
+def beside(path: Path, ending: str) -> Path:
+    """Return the path beside a file or folder with its name and an ending, also of ``.``."""
+    whole = path if path.name.strip(".") else path.resolve()
+    return whole.parent / f"{whole.name}{ending}"
+
+
+def _escape(found: re.Match[str]) -> str:
+    code = ord(found[0])
+    if 0xDC80 <= code <= 0xDCFF:  # a byte that Python could not decode
+        code -= 0xDC00
+        return f"\\x{code:02x}"
+    return found[0].encode("unicode_escape").decode("ascii")

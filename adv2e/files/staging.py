@@ -30,7 +30,7 @@ from adv2e.files.workspace import (
     sync,
     sync_one,
 )
-from adv2e.process import cleanup
+from adv2e.process import signals
 
 Identity = tuple[int, int]
 """Identity of a file or folder under any name: device and inode."""
@@ -55,7 +55,7 @@ class _Output:
         return self.identity is not None and _identity_of(self.final) == self.identity
 
 
-class Staging(cleanup.Unfinished):
+class Staging(signals.Unfinished):
     """Files and folders on their way to their final names.
 
     First they are named with :meth:`file` and :meth:`folder`, which check and touch nothing; then
@@ -167,7 +167,7 @@ class Staging(cleanup.Unfinished):
 
     def prepare(self) -> None:
         """Make the folders that the outputs are to lie in, and clear them of what runs left."""
-        cleanup.add(self)
+        signals.add(self)
         for folder, workspace in self._workspaces.items():
             if workspace.is_made:
                 continue
@@ -256,7 +256,7 @@ class Staging(cleanup.Unfinished):
     def _end(self) -> None:
         for workspace in self._workspaces.values():
             workspace.remove()
-        cleanup.drop(self)
+        signals.drop(self)
 
     def remove_now(self) -> bool:
         """Remove everything temporary although it may be written to at this moment.

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO
 
 from adv2e.errors import DataError
-from adv2e.files.expansion import check_expansion
+from adv2e.files.regular import check_expansion
 from adv2e.process.machine import machine_complaint
 
 _UNREADABLE = (

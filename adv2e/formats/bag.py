@@ -60,19 +60,18 @@ from numpy.typing import NDArray
 
 from adv2e.errors import Adv2eError, DataError, MissingExtraError
 from adv2e.events import EVENT_DTYPE, Events
-from adv2e.files.backlog import Backlog
-from adv2e.files.expansion import check_expansion, expand
+from adv2e.files.regular import check_expansion, expand
 from adv2e.files.staging import Staging
+from adv2e.files.workspace import Backlog
 from adv2e.formats.binary import DECODERS
 from adv2e.formats.clock import shots_in_order
 from adv2e.formats.event_file import MOST_COLUMNS, Columns, EventFile, Facts
 from adv2e.formats.writing import Request, Writer, to_json
 from adv2e.light.pictures import eight_bit
 from adv2e.process.machine import machine_complaint
-from adv2e.sources.frame import Pixels, Shot
+from adv2e.sources.frame import Pixels, Shot, Track, counted
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.times.rates import NS_PER_S
-from adv2e.sources.tracks import Track, counted
 from adv2e.ticks import check_time, check_us
 
 EVENT_ARRAY = "dvs_msgs/msg/EventArray"

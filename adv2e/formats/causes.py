@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from adv2e.causes import CAUSES
 from adv2e.errors import DataError
-from adv2e.files.names import beside as beside_of
+from adv2e.files.regular import beside as beside_of
 
 _DIGITS, _END = ord("0"), ord("\n")
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
-from adv2e.sources.times.units import UNITS
+from adv2e.sources.times.rates import UNITS
 from adv2e.ticks import US, check_numbers, in_ticks
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ a size, ``resolution`` or ``geometry`` has its columns first.
 
 The unit of the times of events follows from one rule for every file.  Events come at any rate, so
 that their times tell less than those of frames
-(:mod:`adv2e.sources.times.units`), which decide where both are whole numbers, or neither is.  Else
+(:mod:`adv2e.sources.times.rates`), which decide where both are whole numbers, or neither is.  Else
 events are, of the first kind that fits:
 
 ============================================ ===============================================
@@ -45,7 +45,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
-from adv2e.sources.times.units import SETTLED, UNITS, Unit, are_dates
+from adv2e.sources.times.rates import SETTLED, UNITS, Unit, are_dates
 
 FEW = 20
 """Number of events below which nothing can be told about their columns."""

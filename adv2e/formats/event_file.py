@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from adv2e.formats.clock import unwrapped
 from adv2e.formats.columns import event_unit, named_geometry
-from adv2e.sources.frame import Light, Shot
-from adv2e.sources.stored import recorded_light
-from adv2e.sources.times.units import Unit
-from adv2e.sources.tracks import Track, choose
+from adv2e.sources.frame import Light, Shot, Track, choose
+from adv2e.sources.listed import recorded_light
+from adv2e.sources.times.rates import Unit
 from adv2e.ticks import US
 
 MOST_COLUMNS = 1 << 16
@@ -144,7 +143,7 @@ class Facts:
     def choose(
         self, events: Sequence[Track], frames: Sequence[Track] = ()
     ) -> tuple[int | None, int | None]:
-        """Return the streams to be read, as :func:`adv2e.sources.tracks.choose` does."""
+        """Return the streams to be read, as :func:`adv2e.sources.frame.choose` does."""
         event, frame, told = choose(self.track, events, frames, self.path)
         self.has_chosen = True
         self.problems += told

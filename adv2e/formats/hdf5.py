@@ -24,11 +24,11 @@ from h5py import h5d, h5z
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
-from adv2e.files.expansion import check_expansion
+from adv2e.files.regular import check_expansion
 from adv2e.formats.columns import SIZE_NAMES, named_geometry, unit_of_attribute
 from adv2e.formats.event_file import Facts
 from adv2e.process.machine import machine_complaint
-from adv2e.sources.tracks import Track, counted
+from adv2e.sources.frame import Track, counted
 
 PART = 1 << 20
 """Events read at once."""

@@ -22,7 +22,7 @@ from adv2e.formats import hdf5
 from adv2e.formats.clock import unwrapped
 from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.sources.frame import Pixels, Shot
-from adv2e.sources.times.units import Unit, frame_unit
+from adv2e.sources.times.rates import Unit, frame_unit
 from adv2e.ticks import NS, US, S, to_ticks
 
 _COARSE_US = 1 << 24
@@ -358,7 +358,7 @@ sensor_resolution (height, width), source; and of ours layout, layout_version an
 ``ps`` has a sign, so that the ``ps * 2 - 1`` of loaders is -1 and not 255, and is no bool, which
 HDF5 has none of: h5py stores an enumeration, which MATLAB reads as words.  Polarities that are read
 may be bool, 0/1 or -1/+1; times are seconds, unless they tell another unit
-(:mod:`adv2e.sources.times.units`); frames come in the order of their names.
+(:mod:`adv2e.sources.times.rates`); frames come in the order of their names.
 
 ``event_idx`` is the index of the last event before the frame,
 ``max(searchsorted(ts, timestamp) - 1, 0)``.

@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 from adv2e.causes import CAUSED_DTYPE
 from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE, Events, by_time, repeated
-from adv2e.files.names import beside
-from adv2e.files.regular import check_ends
+from adv2e.files.regular import beside, check_ends
 from adv2e.formats.causes import beside as beside_of_causes
 from adv2e.formats.causes import check_numbers, found_beside
 from adv2e.formats.clock import Clock
@@ -40,10 +39,8 @@ from adv2e.formats.registry import format_of
 from adv2e.geometry import MOST_PIXELS
 from adv2e.options import EventInput, size_of, takes
 from adv2e.process.machine import machine_complaint
-from adv2e.sources.frame import Pixels, Shot, rotated180
-from adv2e.sources.times.rates import seconds
-from adv2e.sources.times.units import SETTLED
-from adv2e.sources.tracks import Track
+from adv2e.sources.frame import Pixels, Shot, Track, rotated180
+from adv2e.sources.times.rates import SETTLED, seconds
 from adv2e.ticks import check_us
 
 if TYPE_CHECKING:

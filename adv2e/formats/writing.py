@@ -29,7 +29,7 @@ from adv2e.background import default_threads
 from adv2e.causes import CAUSED_DTYPE, has_causes, without_causes
 from adv2e.errors import DataError, OutputError, UsageError, warn
 from adv2e.events import EVENT_DTYPE, Events, checked_events
-from adv2e.files.names import beside
+from adv2e.files.regular import beside
 from adv2e.files.staging import Staging, writing
 from adv2e.formats import causes
 from adv2e.formats.causes import check_numbers

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from adv2e.files.names import shown
+from adv2e.files.regular import shown
 from adv2e.sources.times.rates import seconds
 
 _WIDTH = 12

@@ -31,9 +31,8 @@ from adv2e.kernel.quadrature import rules_for
 from adv2e.kernel.stepped import driver
 from adv2e.kernel.work_queue import STRIP, nothing_claimed
 from adv2e.light.intervals import Part
-from adv2e.pixel.circuit import driver_of, make_circuit
 from adv2e.pixel.merge import Parted, in_order, polarity_bits
-from adv2e.pixel.state import initial_state
+from adv2e.pixel.state import driver_of, initial_state, make_circuit
 from adv2e.pixel.steps import PRECISE, Coarseness, Stepping
 
 _LARGEST_SIDE = 1 << 16

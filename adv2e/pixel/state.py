@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
@@ -11,11 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.config.model import Pixel
+from adv2e.causes import FRAME_COUPLING
+from adv2e.config.model import Pixel, Sampling
+from adv2e.effects.hooks import Hooks
 from adv2e.effects.pixel.initial_reference import RANDOM, RUNNING
+from adv2e.effects.pixel.low_pass import UPDATES
+from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
 from adv2e.effects.pixel.thresholds import FLOOR
-from adv2e.kernel import per_pixel
+from adv2e.errors import UsageError
+from adv2e.kernel import per_pixel, rng
 from adv2e.kernel.circuit import Circuit
+from adv2e.kernel.exact import covers
 from adv2e.kernel.leak import fill_first_factors, fill_running
 from adv2e.kernel.noise import (
     fill_first_candidates,
@@ -146,3 +153,68 @@ def _over_pixels(threads: int, pixels: int, fill: Callable[..., None], *argument
             pool.submit(fill, lo, hi, *arguments) for lo, hi in itertools.pairwise(borders)
         ]:
             done.result()
+
+
+# ---- Circuit parameters for the compiled code from the configuration, and choice of the solver.
+
+
+_NO_KNEE = 1e300
+_PER_US = 1e-6
+
+METHODS = ("auto", "stepped")
+"""Solvers of the circuit: the fastest one that covers it, or steps of time."""
+
+
+def make_circuit(
+    pixel: Pixel, sampling: Sampling, seed: int, causes: bool = False, added: int = FRAME_COUPLING
+) -> Circuit:
+    """Return the circuit of a configuration; rates [1/us], corners [rad/us].
+
+    With `causes`, events have a cause each; `added` is the cause of events by what effects add to
+    the signal.
+    """
+    low_pass, follower, leak = pixel.low_pass, pixel.source_follower, pixel.leak
+    knee_dn = pixel.log_response.linear_below
+    corner = 2.0 * math.pi * _PER_US
+    dark = low_pass.dark_cutoff_hz if low_pass else 0.0
+    white = low_pass.cutoff_hz if low_pass else 0.0
+    noise = pixel.photoreceptor_noise
+    return Circuit(
+        update=UPDATES.index(low_pass.update) if low_pass else 0,
+        steps=sampling.K,
+        printed=sampling.last_interval == "printed",
+        filtered=low_pass is not None,
+        dark=corner * dark,
+        per_dn=corner * (white - dark) / 255.0,
+        slew=pixel.slew_limit.per_s * _PER_US if pixel.slew_limit else 0.0,
+        follower=corner * follower.cutoff_hz if follower else 0.0,
+        knee=math.log(knee_dn) if knee_dn > 0 else -_NO_KNEE,
+        slope=knee_dn / math.log(knee_dn) if knee_dn > 0 else 0.0,
+        floor=pixel.log_response.floor,
+        dead_time=pixel.refractory.period_us if pixel.refractory else 0.0,
+        overshoot=pixel.reset_overshoot.fraction if pixel.reset_overshoot else 0.0,
+        leak=leak.rate_hz * _PER_US if leak else 0.0,
+        photo_leak=leak.photo_rate_hz * _PER_US / 255.0 if leak else 0.0,
+        leak_jitter=leak.jitter if leak else 0.0,
+        shot_rate=pixel.shot_noise.rate_hz * _PER_US if pixel.shot_noise else 0.0,
+        shot_fall=FALL_AT_WHITE / 255.0,
+        hot_rate=(
+            pixel.hot_pixels.rate_hz * _PER_US
+            if pixel.hot_pixels and pixel.hot_pixels.fraction > 0
+            else 0.0
+        ),
+        hot_spread=math.log(10.0) * pixel.hot_pixels.spread if pixel.hot_pixels else 0.0,
+        noise_rms=noise.rms if noise else 0.0,
+        noise_step=noise.step if noise else 0.1,
+        causes=causes,
+        added=added,
+        seed=rng.key_of(seed),
+    )
+
+
+def driver_of(pixel: Pixel, circuit: Circuit, inside: Sequence[Hooks], method: str) -> str:
+    """Return the name of the compiled function that advances pixels with effects inside them."""
+    if method not in METHODS:
+        raise UsageError(f"method: must be one of {', '.join(METHODS)}, got {method!r}")
+    steps = method == "stepped" or bool(inside) or not covers(circuit)
+    return "run_stepped" if steps else "run_exact"

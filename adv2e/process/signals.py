@@ -1,6 +1,6 @@
 """Signals that end the program: they remove unfinished files, and end it where it is.
 
-See :mod:`adv2e.process.cleanup` for why.  Where files cannot be removed like that, a signal arrives
+See :mod:`adv2e.process.signals` for why.  Where files cannot be removed like that, a signal arrives
 as an exception, and they are as for any error.
 
 Who takes what others send for as long as they please, such as frames of a camera, can have the
@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-from adv2e.process import cleanup as unfinished
+from adv2e.process import signals as unfinished
 from adv2e.process.standard_error import errors_descriptor
 
 
@@ -186,3 +186,46 @@ def _say_at_once(text: str) -> None:
         errors = errors_descriptor()
         start = "\r\x1b[K" if os.isatty(errors) else ""
         os.write(errors, f"{start}adv2e: {text}\n".encode())
+
+
+# ---- Removal of unfinished files and folders when a signal ends the program.
+#
+# A signal can come at any instruction of the main thread, one that just took a lock among them. An
+# exception raised there leaves the lock taken, and a thread that waits for it waits for ever. So a
+# signal ends the program where it is, as it does Git: the files listed here are removed, which
+# takes no lock, and the process exits.
+
+
+class Unfinished:
+    """Files or folders that nobody is to find when the program has ended."""
+
+    def remove_now(self) -> bool:
+        """Remove them, also while they are written; tell whether all are gone."""
+        raise NotImplementedError
+
+
+_listed: dict[int, Unfinished] = {}
+
+
+def add(thing: Unfinished) -> None:
+    """Have `thing` removed if a signal comes."""
+    _listed[id(thing)] = thing
+
+
+def drop(thing: Unfinished) -> None:
+    """Forget `thing`, if it is known at all."""
+    _listed.pop(id(thing), None)
+
+
+def remove_all() -> bool:
+    """Remove everything listed; tell whether all is gone.
+
+    For signal handlers: takes no locks and raises nothing.
+    """
+    gone = True
+    for thing in list(_listed.values()):
+        removed = False
+        with suppress(OSError):
+            removed = thing.remove_now()
+        gone = gone and removed
+    return gone

@@ -11,8 +11,7 @@ preview  :func:`open_preview`: a stream of events and frames -> film or sheet, i
 from __future__ import annotations
 
 from adv2e.rendering.films import check_suffix
-from adv2e.rendering.preview import open_preview
-from adv2e.rendering.recording import render_recording
+from adv2e.rendering.recording import open_preview, render_recording
 from adv2e.rendering.styles import STYLES, Style, draw, parse_colour
 
 __all__ = [

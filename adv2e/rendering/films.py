@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError, OutputError, UsageError
 from adv2e.files.staging import Staging, writing
-from adv2e.rendering.layout import Cell, compose, default_scale, sheet
-from adv2e.rendering.styles import Picture, Style
+from adv2e.rendering.styles import Cell, Picture, Style, compose, default_scale, sheet
 from adv2e.sources.video.listing import list_pictures
 from adv2e.sources.video.opening import opened
 

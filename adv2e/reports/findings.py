@@ -10,10 +10,20 @@ from pathlib import Path
 from typing import Any
 
 from adv2e.effects import label_of, separated_by
-from adv2e.reports.charts.error_chart import error_chart
+from adv2e.reports.charts.curve_chart import error_chart
 from adv2e.reports.headline import declared_text
-from adv2e.reports.keys import heading_of, meaning_of, summary_of, unit_of
-from adv2e.reports.markup import Column, Markup, join, table, tag
+from adv2e.reports.markup import (
+    OF_TABLES,
+    Column,
+    Markup,
+    heading_of,
+    join,
+    meaning_of,
+    summary_of,
+    table,
+    tag,
+    unit_of,
+)
 from adv2e.reports.quantities import (
     NO_UNIT,
     interval_text,
@@ -25,7 +35,6 @@ from adv2e.reports.quantities import (
 )
 from adv2e.reports.result import Diagnosis, Interval, ListInterval
 from adv2e.reports.standing_out import of_each_kind
-from adv2e.reports.wording import OF_TABLES
 
 _LEAST_P = 0.01
 """Probability from which on chance may make what is left."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from adv2e.effects import label_of
-from adv2e.reports.keys import part_of, unit_of
+from adv2e.reports.markup import part_of, unit_of
 from adv2e.reports.quantities import (
     beside,
     interval_text,

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.reports.headline import sentence_of
-from adv2e.reports.keys import NO_OWN, Own
-from adv2e.reports.wording import OF_RECORDINGS, Wording
+from adv2e.reports.markup import NO_OWN, OF_RECORDINGS, Own, Wording
 
 Verdict = Literal["consistent", "explained", "partly_explained", "not_identifiable", "unexplained"]
 

@@ -5,17 +5,16 @@ from __future__ import annotations
 import textwrap
 
 from adv2e.reports.headline import declared_text
-from adv2e.reports.keys import unit_of
-from adv2e.reports.markup import plain
+from adv2e.reports.markup import plain, unit_of
 from adv2e.reports.quantities import (
     interval_text,
     number_text,
     probability_text,
     value_text,
 )
+from adv2e.reports.residual import by_explained
 from adv2e.reports.result import Diagnosis, ErrorRow
 from adv2e.reports.standing_out import compared_text, of_each_kind
-from adv2e.reports.trials import by_explained
 
 WIDTH = 100
 _MOST_PARAMETERS = 5

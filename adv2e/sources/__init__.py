@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 from adv2e.errors import DataError, UsageError
 from adv2e.files.regular import check_ends
 from adv2e.options import SourceOptions, size_of, takes
-from adv2e.sources.base import Source
+from adv2e.sources.base import GivenTimes, Selection, Source
 from adv2e.sources.frame import Frame
 from adv2e.sources.paths import SensorPath
-from adv2e.sources.wanted import GivenTimes, Selection
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

@@ -27,14 +27,13 @@ from itertools import pairwise
 from pathlib import Path
 
 from adv2e.errors import DataError
+from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.frame import Light
 from adv2e.sources.images.opencv import read_image
 from adv2e.sources.images.source import found_list, image_files
 from adv2e.sources.listed import ListedSource, Picture, timed
 from adv2e.sources.times.lists import FrameList
-from adv2e.sources.times.rates import FrameRate, Stamp
-from adv2e.sources.times.units import Unit
-from adv2e.sources.wanted import GivenTimes, Selection
+from adv2e.sources.times.rates import FrameRate, Stamp, Unit
 
 _HZ = 240
 _SEQUENCE = re.compile(r"GOPR\d{4}_(\d{2})_\d{2}", re.ASCII)

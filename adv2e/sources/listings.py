@@ -29,11 +29,11 @@ from pathlib import Path, PurePosixPath
 
 from adv2e.errors import DataError
 from adv2e.files.zips import Members
+from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.frame import Light, Pixels
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, decode_image
 from adv2e.sources.listed import ListedSource, Picture, timed
 from adv2e.sources.times.lists import decoded, first_name, member_of, members_of, parse_list
-from adv2e.sources.wanted import GivenTimes, Selection
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,11 @@ from numpy.typing import NDArray
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
 from adv2e.files.npy import Header, read_array, read_header
+from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.frame import Pixels, check_pixels
 from adv2e.sources.listed import ListedSource, Picture, Timed, timed
 from adv2e.sources.times.lists import FrameList, read_list
-from adv2e.sources.times.rates import Stamp
-from adv2e.sources.times.units import frame_unit
-from adv2e.sources.wanted import GivenTimes, Selection
+from adv2e.sources.times.rates import Stamp, frame_unit
 from adv2e.ticks import NS, to_ticks
 
 

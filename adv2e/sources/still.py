@@ -14,12 +14,11 @@ from functools import partial
 from pathlib import Path
 
 from adv2e.errors import DataError, UsageError
-from adv2e.sources.base import Source
+from adv2e.sources.base import GivenTimes, Selection, Source
 from adv2e.sources.frame import Pixels, Shot
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, read_image
 from adv2e.sources.paths import SensorPath
 from adv2e.sources.times.rates import NS_PER_S, FrameRate
-from adv2e.sources.wanted import GivenTimes, Selection
 
 _MOST_FRAMES = 10_000_000
 

@@ -11,14 +11,13 @@ from pathlib import Path, PurePosixPath
 from adv2e.errors import DataError
 from adv2e.files.zips import Members
 from adv2e.sources import davis240c
+from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.frame import Pixels
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, decode_image
 from adv2e.sources.images.source import LISTS, in_order
-from adv2e.sources.listed import ListedSource, Picture, timed
+from adv2e.sources.listed import LIST, ListedSource, Picture, timed
 from adv2e.sources.listings import find_listing, open_listing
-from adv2e.sources.stored import LIST
 from adv2e.sources.times.lists import FrameList, decoded, parse_list
-from adv2e.sources.wanted import GivenTimes, Selection
 
 
 def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSource:

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.synthetic.clips import encode_srgb
+from adv2e.synthetic.scene import encode_srgb
 
 Array = NDArray[np.float64]
 

@@ -31,7 +31,7 @@ from writing import as_written, output_option, table, write_report
 from adv2e.comparison.distances import MEASURES, distances
 from adv2e.comparison.floor import Floor, half_split
 from adv2e.comparison.windows import Windows
-from adv2e.diagnosis.fitting.nuisances import TOLERANCE
+from adv2e.diagnosis.fitting.fitter import TOLERANCE
 from adv2e.events import Events, empty_events
 from adv2e.sources.times.rates import seconds
 from experiments import side_by_side

@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 from adv2e.errors import DataError
 from adv2e.events import Events, cut, make_events, sort_events
 from adv2e.exporting.ev_segnet import DDD17, DDD17_ROWS
-from adv2e.representations.event_images import event_image
+from adv2e.representations.voxel_grid import event_image
 from experiments.clip import Clip, Simulator
 from experiments.scenes import HZ, shape_clip
 from experiments.training import Update, written

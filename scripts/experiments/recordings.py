@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from adv2e.comparison.distances import distances, pooled
 from adv2e.comparison.floor import Floor
 from adv2e.comparison.windows import Windows, frame_windows, span_of, to_us
-from adv2e.diagnosis.fitting.nuisances import TOLERANCE, match_totals
+from adv2e.diagnosis.fitting.fitter import TOLERANCE, match_totals
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
 from adv2e.events import Events, Window, cut

@@ -11,7 +11,7 @@ Written after the network that the authors train (``Segception_small``); what is
 
 The parameters of the encoder are as many as those of Keras's Xception.  The decay of weights that
 the layers of the authors declare never reaches their loss, so there is none.  The six channels are
-:func:`adv2e.representations.event_images.event_image`.  Needs PyTorch.
+:func:`adv2e.representations.voxel_grid.event_image`.  Needs PyTorch.
 
 References
 ----------

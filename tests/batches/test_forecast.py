@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from trees_of_batch import clip, last_of
 
-from adv2e.batches import forecast as module
+from adv2e.batches import run as module
 from adv2e.batches.plan import Task
 from adv2e.batches.sequences import Sequence
 from adv2e.conversion.estimate import Estimate

@@ -171,7 +171,7 @@ def test_a_file_of_settings_in_the_current_folder_is_not_read(start, tmp_path, b
 
 HELD = """
 import sys, time
-from adv2e.files.locks import lock_file
+from adv2e.files.workspace import lock_file
 with open(sys.argv[1], "ab", buffering=0) as file:
     assert lock_file(file, wait=True)
     print("held", flush=True)

@@ -26,7 +26,7 @@ from adv2e.config import load_config, names_of
 from adv2e.conversion import pipeline as conversion
 from adv2e.conversion.simulation import events_from_light
 from adv2e.events import empty_events
-from adv2e.files.names import shown
+from adv2e.files.regular import shown
 from adv2e.formats.reading import read_events
 
 

@@ -20,7 +20,7 @@ from pictures import picture
 from adv2e.config import load_config
 from adv2e.conversion.demo import run_demo
 from adv2e.synthetic import Scene
-from adv2e.synthetic.clips import write_video
+from adv2e.synthetic.scene import write_video
 
 FRAMES = 12
 

@@ -21,7 +21,7 @@ from adv2e.effects.reorder_buffer import InOrder
 from adv2e.errors import ConfigError, DataError
 from adv2e.events import make_events
 from adv2e.parameters import Fit, Section, parameter
-from adv2e.pixel.circuit import make_circuit
+from adv2e.pixel.state import make_circuit
 from adv2e.pixel.steps import Coarseness, steps_of
 
 ROWS, COLUMNS = 3, 4

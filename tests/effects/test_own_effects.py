@@ -16,7 +16,7 @@ from adv2e.diagnosis.configurations import as_found, own_of, without_user_effect
 from adv2e.diagnosis.fitting.library import library, names
 from adv2e.diagnosis.hints.collect import Hints
 from adv2e.errors import ConfigError
-from adv2e.reports.keys import meaning_of, summary_of, unit_of
+from adv2e.reports.markup import meaning_of, summary_of, unit_of
 
 HINTS = Hints(1.0, (), 1)
 HEAD = """

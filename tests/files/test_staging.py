@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from adv2e.errors import OutputError
-from adv2e.files import locks
 from adv2e.files import staging as staging_module
+from adv2e.files import workspace
 from adv2e.files.staging import Staging
 from adv2e.files.workspace import remove_abandoned
 
@@ -470,7 +470,7 @@ def test_without_locks_nothing_looks_dead(tmp_path, monkeypatch):
         raise OSError(errno.ENOLCK, "No locks available")
 
     with monkeypatch.context() as patch:
-        patch.setattr(locks.fcntl, "flock", no_locks)
+        patch.setattr(workspace.fcntl, "flock", no_locks)
         live = staged(tmp_path / "a.txt")
         assert len(names(tmp_path)) == 1
     remove_abandoned(tmp_path)

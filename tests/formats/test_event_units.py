@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adv2e.formats.columns import event_unit
-from adv2e.sources.times.units import UNITS, Unit
+from adv2e.sources.times.rates import UNITS, Unit
 
 UNIT = st.sampled_from(list(UNITS))
 EPOCH_S = 1_468_941_032

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from adv2e.events import empty_events, make_events, sort_events
-from adv2e.inspection.events import describe_events, oddities_of, tick_us
+from adv2e.inspection.inspect import describe_events, oddities_of, tick_us
 
 
 def regular(count=5000, step_us=50):

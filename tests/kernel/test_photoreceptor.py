@@ -26,7 +26,7 @@ from adv2e.kernel.cascade.plan import plan_for
 from adv2e.kernel.photoreceptor import law
 from adv2e.kernel.photoreceptor.strip import BLOCKS
 from adv2e.kernel.quadrature import rounded
-from adv2e.pixel.circuit import make_circuit
+from adv2e.pixel.state import make_circuit
 
 RAD_US = 2 * math.pi * 1e-6
 

@@ -6,7 +6,7 @@ from scipy import stats
 from adv2e.cli.options import SEED
 from adv2e.config.model import Pixel, Sampling
 from adv2e.kernel import rng
-from adv2e.pixel.circuit import make_circuit
+from adv2e.pixel.state import make_circuit
 
 
 def test_philox_known_answers():

@@ -6,8 +6,7 @@ import pytest
 
 from adv2e.errors import UsageError
 from adv2e.rendering.films import Film, Sheet, check_suffix
-from adv2e.rendering.layout import Cell
-from adv2e.rendering.styles import Style
+from adv2e.rendering.styles import Cell, Style
 
 
 def noise(rows, columns, seed=0):

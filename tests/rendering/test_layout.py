@@ -3,16 +3,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adv2e.rendering.layout import (
+from adv2e.rendering.styles import (
     GAP,
     MOST_PIXELS,
     STRIP,
     Cell,
+    Style,
     compose,
     default_scale,
     sheet,
 )
-from adv2e.rendering.styles import Style
 
 
 def panel(level, rows=60, columns=200):

@@ -19,7 +19,7 @@ from adv2e.formats.reading import Recording, read_events
 from adv2e.rendering import Style, open_preview, render_recording
 from adv2e.rendering.timeline import Timeline
 from adv2e.synthetic import Scene
-from adv2e.synthetic.clips import write_video
+from adv2e.synthetic.scene import write_video
 
 WIDTH, HEIGHT = 16, 12
 

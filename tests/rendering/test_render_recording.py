@@ -7,7 +7,7 @@ import pytest
 from adv2e.errors import DataError
 from adv2e.events import empty_events, make_events
 from adv2e.formats.reading import Recording
-from adv2e.rendering import Style, films, layout, render_recording
+from adv2e.rendering import Style, films, render_recording, styles
 
 EPOCH = 1_470_000_000_000_000  # us
 
@@ -35,9 +35,9 @@ def cells(monkeypatch, tmp_path):
             seen.append((cell.caption, frame))
             return original(cell, *rest)
 
-        original = films.compose if name.endswith("avi") else layout.compose
+        original = films.compose if name.endswith("avi") else styles.compose
         with monkeypatch.context() as patch:
-            patch.setattr(films if name.endswith("avi") else layout, "compose", compose)
+            patch.setattr(films if name.endswith("avi") else styles, "compose", compose)
             render_recording(what, tmp_path / name, scale=1, **more)
         return seen
 

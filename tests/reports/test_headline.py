@@ -8,9 +8,8 @@ from made_up_diagnosis import everything
 from adv2e.diagnosis.fitting.library import names
 from adv2e.effects import label_of
 from adv2e.reports.findings import convert_line, next_steps
-from adv2e.reports.keys import Own, heading_of, part_of
+from adv2e.reports.markup import OF_TABLES, Own, heading_of, part_of
 from adv2e.reports.result import Finding, Signature
-from adv2e.reports.wording import OF_TABLES
 
 DEAD = Finding(
     "refractory",

@@ -12,22 +12,24 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from made_up_diagnosis import everything, strange
 
-from adv2e.reports.charts.axes import Axis, axis_over, drawable
 from adv2e.reports.charts.curve_chart import (
+    Axis,
+    axis_over,
     band_path,
     curve_chart,
     curves,
+    drawable,
+    error_chart,
     line_path,
     points_of,
 )
-from adv2e.reports.charts.error_chart import error_chart
 from adv2e.reports.charts.pictures import (
     colour_bar,
     colours,
     map_image,
 )
+from adv2e.reports.markup import OF_RECORDINGS
 from adv2e.reports.result import Band, Curve, ErrorRow, Estimate
-from adv2e.reports.wording import OF_RECORDINGS
 
 NAN = np.nan
 ANY = hnp.arrays(np.float64, st.integers(0, 8), elements=st.floats())

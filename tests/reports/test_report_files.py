@@ -13,8 +13,7 @@ from adv2e.config import from_dict, load_config
 from adv2e.config.yaml12 import Origin, parse
 from adv2e.errors import OutputError
 from adv2e.reports import files
-from adv2e.reports.files import check_folder, write_reports
-from adv2e.reports.model_file import model_text
+from adv2e.reports.files import check_folder, model_text, write_reports
 from adv2e.reports.quantities import native
 from adv2e.reports.result import ErrorRow, Estimate, Finding
 from adv2e.reports.summary import summary_text

@@ -13,10 +13,10 @@ from made_up_diagnosis import HOSTILE, everything, nothing, strange
 
 from adv2e.effects import separated_by
 from adv2e.reports.findings import MARKS
+from adv2e.reports.markup import OF_TABLES
 from adv2e.reports.page import page
 from adv2e.reports.result import Estimate, Rejected, ResidualMap, Signature, Snapshot, Total
 from adv2e.reports.summary import details_text
-from adv2e.reports.wording import OF_TABLES
 
 EMPTY = {"br", "img", "meta"}
 LOADING = {"src", "href", "srcset", "data", "action", "poster"}

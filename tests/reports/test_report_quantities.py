@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adv2e.reports.keys import meaning_of, summary_of, unit_of
-from adv2e.reports.markup import join, markup, plain, tag
+from adv2e.reports.markup import join, markup, meaning_of, plain, summary_of, tag, unit_of
 from adv2e.reports.quantities import (
     alike_texts,
     beside,

@@ -8,7 +8,7 @@ import pytest
 from made_up_diagnosis import HOSTILE, everything, nothing, strange
 
 from adv2e.reports.files import record, record_text
-from adv2e.reports.wording import OF_RECORDINGS, OF_TABLES
+from adv2e.reports.markup import OF_RECORDINGS, OF_TABLES
 
 VERDICTS = ("consistent", "explained", "partly_explained", "not_identifiable", "unexplained")
 

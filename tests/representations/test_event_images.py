@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from adv2e.events import empty_events, make_events
-from adv2e.representations.event_images import event_image
+from adv2e.representations.voxel_grid import event_image
 
 SIZE = 12, 9
 

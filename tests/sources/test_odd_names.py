@@ -11,7 +11,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from adv2e.files.names import shown
+from adv2e.files.regular import shown
 from adv2e.formats.reading import read_events
 from adv2e.rendering.films import GifFile
 from adv2e.rendering.styles import Style

@@ -13,7 +13,7 @@ from adv2e import convert, read_events, write_events
 from adv2e.errors import DataError
 from adv2e.formats.reading import open_events
 from adv2e.sources import open_source
-from adv2e.sources.tracks import Track, choose
+from adv2e.sources.frame import Track, choose
 
 EVENTS = [
     Track("DAVIS_1/denoised", "100 events"),

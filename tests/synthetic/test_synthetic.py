@@ -6,8 +6,15 @@ import pytest
 
 from adv2e.errors import OutputError
 from adv2e.synthetic import Scene
-from adv2e.synthetic.clips import encode_srgb, write_video
-from adv2e.synthetic.scene import BRIGHTEST, DARKEST, GO_S, PERIOD_S, RAMP_S
+from adv2e.synthetic.scene import (
+    BRIGHTEST,
+    DARKEST,
+    GO_S,
+    PERIOD_S,
+    RAMP_S,
+    encode_srgb,
+    write_video,
+)
 
 REST = 0.7  # a time at which the scene rests
 MOTION = 0.3

@@ -17,10 +17,10 @@ from adv2e.diagnosis.data.stream import Stream
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
 from adv2e.events import Events
-from adv2e.files.names import shown
+from adv2e.files.regular import shown
 from adv2e.formats.reading import read_events
 from adv2e.geometry import Rectangle
-from adv2e.light.decoding import decoder_for
+from adv2e.light.pictures import decoder_for
 from adv2e.light.sensor import check_beside
 from adv2e.reports.result import Masked
 

@@ -28,7 +28,7 @@ from adv2e.diagnosis.hints.lamps import Lamp
 from adv2e.diagnosis.hints.readouts import WIDTH, has_pulse
 from adv2e.effects.pixel.initial_reference import RANDOM, SETTLED
 from adv2e.parameters import Fit
-from adv2e.reports.keys import BUILT_IN
+from adv2e.reports.markup import BUILT_IN
 
 OF_FRAMES = (
     *("black_level", "exposure_blur", "misregistration", "flicker", "frame_encoding"),

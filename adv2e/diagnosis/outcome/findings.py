@@ -19,8 +19,8 @@ from adv2e.diagnosis.selection.reference import Reference, State
 from adv2e.diagnosis.selection.search import Outcome
 from adv2e.diagnosis.statistics.summary import BOTH
 from adv2e.errors import ConfigError
+from adv2e.reports.residual import by_explained
 from adv2e.reports.result import Finding, Rejected, Signature
-from adv2e.reports.trials import by_explained
 
 _LITTLE_DOUBT = 0.3
 """Limit of negligible uncertainty by frames, in deviations of chance: it widens them by 4 %."""

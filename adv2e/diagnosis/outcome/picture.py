@@ -25,9 +25,8 @@ from adv2e.diagnosis.data.scene import (
 )
 from adv2e.diagnosis.data.stimulus import Leaps
 from adv2e.diagnosis.statistics.groups import excess
-from adv2e.diagnosis.statistics.intervals import BORDERS_MS
 from adv2e.diagnosis.statistics.rates import by_load, rate_hz
-from adv2e.diagnosis.statistics.timing import LAGS_MS
+from adv2e.diagnosis.statistics.timing import BORDERS_MS, LAGS_MS
 from adv2e.reports.result import Band, Curve, Estimate, ResidualMap, Snapshot, Total
 
 Array = NDArray[np.float64]

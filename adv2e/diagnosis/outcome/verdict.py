@@ -3,23 +3,41 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e.comparison.distances import SIGMAS_US, smoothed_norms
 from adv2e.config import Config
 from adv2e.diagnosis.configurations import without_coupling
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.scene import Placed
 from adv2e.diagnosis.data.stream import Stream
-from adv2e.diagnosis.outcome.error import Errors, error_rows, of_interpolation
+from adv2e.diagnosis.fitting.candidates import Candidate, neutral_value
+from adv2e.diagnosis.hints.readouts import DRIFT
 from adv2e.diagnosis.outcome.picture import curves_of, maps_of, snapshot_of, totals_of
 from adv2e.diagnosis.prepare import Prepared
-from adv2e.diagnosis.selection.reference import State
+from adv2e.diagnosis.selection.reference import OF_RECORDINGS, Reference, State
 from adv2e.diagnosis.selection.search import PER_LOOK, Outcome, Search
 from adv2e.diagnosis.simulation.simulator import Simulator
+from adv2e.diagnosis.statistics.metric import Ensemble, expanded
+from adv2e.diagnosis.statistics.summary import BOTH
 from adv2e.diagnosis.statistics.uncertainty import every
 from adv2e.effects import label_of
-from adv2e.reports.result import Curve, ErrorRow, ResidualMap, Snapshot, Total, Verdict
+from adv2e.reports.markup import known_keys
+from adv2e.reports.result import (
+    Curve,
+    Detectable,
+    ErrorRow,
+    Estimate,
+    ResidualMap,
+    Snapshot,
+    Total,
+    Verdict,
+)
 
 _PARTLY = 0.8
 """Share of the residual that effects must explain to be named when something is left."""
@@ -197,3 +215,205 @@ def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion
     return Conclusion(
         verdict, kept, rows, curves_of(*seen), maps_of(*seen), totals_of(*seen), snapshot_of(*seen)
     )
+
+
+# ---- The size of each effect that would have been seen.
+
+
+_SEEN = 0.8
+_ROUNDS = (range(1, 3), range(301, 305), range(305, 315))
+"""Seeds of the recordings that are simulated at each size; first those of the starts."""
+_FARTHEST = 10.0
+_SETTLED = 2.0
+"""Factor by which the last round may still change a size that is told."""
+
+
+def detectable(
+    reference: Reference, declared: State, candidates: Sequence[Candidate]
+) -> list[Detectable]:
+    """Return the size of each effect that would have been seen about 8 times in 10.
+
+    Recordings with the effect are simulated, from a mild start on, and judged as the real one is;
+    how much more or less of it would just have been seen, as if what it changes grew in proportion,
+    is tried in the next round.  Where no size within the physical range would have been seen, or
+    none was settled on, there is none.
+    """
+    reference.begin("finding what could have been seen")
+    mildest: dict[str, Candidate] = {}
+    for candidate in candidates:
+        if candidate.parameters:
+            # how fast the clock of the frames is would be seen by itself
+            extra = tuple((key, value) for key, value in candidate.extra if key != DRIFT)
+            mildest.setdefault(candidate.name, replace(candidate, extra=extra))
+    every = [_Size.of(candidate, declared.config) for candidate in mildest.values()]
+    sizes, ensemble = every, declared.ensembles[BOTH]
+    for seeds in _ROUNDS:
+        if not sizes:
+            break
+        configs = [size.config(declared.config) for size in sizes]
+        is_last = seeds == _ROUNDS[-1]
+        sampler = reference.sampler if is_last else reference.sampler.rough
+        sample = sampler.samples(configs, seeds)[:, :, BOTH]
+        for size, rows in zip(sizes, sample, strict=True):
+            recordings = reference.error.blurred(rows, BOTH, OF_RECORDINGS)
+            factors = [_missing(ensemble, row) for row in recordings]
+            size.change_by(float(np.quantile(factors, _SEEN)))
+        sizes = [size for size in sizes if math.isfinite(size.factor)]
+    return [size.found(declared.config) for size in every]
+
+
+@dataclass
+class _Size:
+    """An effect, the value of its first key where it does nothing, that now, and other keys'.
+
+    `factor`: by which the last round changed it; infinite: it left the physical range.
+    """
+
+    candidate: Candidate
+    neutral: float
+    value: float
+    rest: tuple[float, ...]
+    factor: float = 1.0
+
+    @classmethod
+    def of(cls, candidate: Candidate, config: Config) -> _Size:
+        """Return the first start that the physical range leaves room to grow from, if any."""
+        neutral = neutral_value(config, candidate.parameters[0])
+        made = [cls(candidate, neutral, start[0], start[1:]) for start in candidate.starts]
+        return next((one for one in made if one._is_physical(one._changed(_FARTHEST))), made[0])
+
+    def config(self, declared: Config) -> Config:
+        values = (self.value, *self.rest)
+        return self.candidate.applied(declared, self.candidate.scaled(values))
+
+    def change_by(self, factor: float) -> None:
+        wanted = self._changed(factor)
+        self.factor = factor if self._is_physical(wanted) else math.inf
+        self.value = wanted
+
+    def _changed(self, factor: float) -> float:
+        if math.isinf(self.neutral):
+            return self.value / factor
+        return self.neutral + factor * (self.value - self.neutral)
+
+    def _is_physical(self, value: float) -> bool:
+        return self.candidate.parameters[0].low <= value <= self.candidate.parameters[0].high
+
+    def found(self, declared: Config) -> Detectable:
+        key = self.candidate.parameters[0].key
+        is_settled = 1.0 / _SETTLED <= self.factor <= _SETTLED
+        unit = known_keys(type(declared))[key].unit
+        return Detectable(self.candidate.name, key, self.value if is_settled else None, unit)
+
+
+def _missing(ensemble: Ensemble, recording: NDArray[np.float64]) -> float:
+    """Return by which factor an effect must be larger to be seen in a recording with it."""
+    misfit_limit, largest_limit = ensemble.limits(PER_LOOK)
+    # squares add up, single deviations grow in proportion
+    misfit = (ensemble.misfit(recording) - ensemble.floor) / (misfit_limit - ensemble.floor)
+    loudest = expanded(np.abs(ensemble.z(recording)).max())
+    usual = expanded(ensemble.typical_largest)
+    deviation = float((loudest - usual) / (expanded(largest_limit) - usual))
+    factor = min(max(misfit, 1e-6) ** -0.5, 1.0 / max(deviation, 1e-6))
+    return float(min(max(factor, 1.0 / _FARTHEST), _FARTHEST))
+
+
+# ---- Distance between recording and simulations on the data that are looked at once.
+
+
+NAME = "distance of measured and simulated events (ON +1, OFF -1), smoothed in time"
+OF_MEAN = "the same from the mean of simulations, without the chance of each"
+PAIRS = 20
+"""Pairs of independent draws that the floor is the mean of."""
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Of the simulations of one model, as parts of the norm of what was measured.
+
+    To that, (simulations, scales), and between independent ones, (pairs, scales).
+    """
+
+    to_measured: Array
+    between: Array
+
+    @classmethod
+    def of(cls, measured: Stream, simulations: Sequence[Stream]) -> Errors:
+        """Return the errors of simulations; NaN if nothing was measured."""
+        unit = _norm(measured)
+        return cls(
+            np.array([_apart(measured, stream, unit) for stream in simulations]),
+            np.array([_apart(a, b, unit) for a, b in _pairs(simulations)]),
+        )
+
+    @property
+    def own(self) -> Array:
+        """Square of what is each simulation's own chance, (scales,)."""
+        return 0.5 * _mean_square(self.between)
+
+
+def error_rows(before: Errors, after: Errors) -> list[ErrorRow]:
+    """Return the error over all scales, at each scale, and of the mean of simulations.
+
+    Random events cost, wherever they come: a model that makes them as the camera does is farther
+    off by the first of these than one without.  The last is not moved by that: the distance d from
+    one simulation and c from one to another are those from their mean by d^2 = m^2 + c^2/2.  The
+    floor is that of the model found, `after`.
+    """
+    names = [NAME, *(f"{NAME} over {sigma / 1e3:g} ms" for sigma in SIGMAS_US)]
+    first, second, floor = (
+        [_estimate(column) for column in (apart.mean(axis=1), *apart.T)]
+        for apart in (before.to_measured, after.to_measured, after.between)
+    )
+    rows = [ErrorRow(*row) for row in zip(names, first, second, floor, strict=True)]
+    squares = (*(_mean_square(one.to_measured) - one.own for one in (before, after)), after.own)
+    roots = [Estimate(float(np.sqrt(np.maximum(one, 0.0)).mean())) for one in squares]
+    rows.append(ErrorRow(OF_MEAN, roots[0], roots[1], roots[2], without_chance=True))
+    return rows
+
+
+def of_interpolation(
+    measured: Stream, full: Sequence[Stream], half: Sequence[Stream], floor: float
+) -> float:
+    """Return the part of the error that interpolation between frames makes; it adds in squares.
+
+    About half of the error that leaving out every second frame adds, within a factor of two:
+    between a third, where frames resolve the motion, and all of it
+    (:mod:`adv2e.diagnosis.statistics.uncertainty`).  `full`: simulations with all frames, whose
+    error has the noise floor `floor`; `half`: with every second frame, of other seeds.
+    """
+    unit = _norm(measured)
+    apart = np.mean([_apart(a, b, unit).mean() for a, b in zip(full, half, strict=True)])
+    square = float(apart) ** 2 - floor**2
+    return 0.5 * math.sqrt(square) if square > 0.0 else 0.0  # not a number: nothing measured
+
+
+def _norm(measured: Stream) -> Array:
+    return smoothed_norms([(measured.events(), 1.0)], measured.width, SIGMAS_US)
+
+
+def _apart(a: Stream, b: Stream, unit: Array) -> Array:
+    apart = smoothed_norms([(a.events(), 1.0), (b.events(), -1.0)], a.width, SIGMAS_US)
+    return np.asarray(apart / np.where(unit > 0.0, unit, np.nan))
+
+
+def _pairs(streams: Sequence[Stream]) -> list[tuple[Stream, Stream]]:
+    """Return pairs that use every stream about as often."""
+    n = len(streams)
+    pairs = [(k, (k + gap) % n) for gap in range(1, n) for k in range(n) if k < (k + gap) % n]
+    return [(streams[a], streams[b]) for a, b in pairs[: max(PAIRS, n)]]
+
+
+def _mean_square(apart: Array) -> Array:
+    """Return the mean square of distances (n, scales), nothing for none."""
+    if not apart.size:
+        return np.zeros(len(SIGMAS_US))
+    return np.asarray((apart * apart).mean(axis=0))
+
+
+def _estimate(values: Array) -> Estimate:
+    """Return the mean, and the range of the middle 95 % of the draws."""
+    low, high = np.quantile(values, [0.025, 0.975])
+    return Estimate(float(values.mean()), (float(low), float(high)))

@@ -17,7 +17,7 @@ from adv2e.diagnosis.data.evidence import Evidence, check_events
 from adv2e.effects.composition import begin, inside_pixel, longest_step_us
 from adv2e.kernel.circuit import EXACT
 from adv2e.light.interpolation.linear import instant_ns
-from adv2e.pixel.circuit import driver_of, make_circuit
+from adv2e.pixel.state import driver_of, make_circuit
 from adv2e.pixel.steps import Coarseness, steps_of
 from adv2e.reports.result import Masked
 

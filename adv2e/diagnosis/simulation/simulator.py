@@ -4,20 +4,30 @@ from __future__ import annotations
 
 import dataclasses
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adv2e.config import Config
+from adv2e.config.active_effects import active_hooks, frame_hooks
+from adv2e.config.model import Frames, Sampling
+from adv2e.config.user_effects import user_effects
+from adv2e.conversion.simulation import events_from_light
+from adv2e.diagnosis.configurations import coupling_of
 from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.simulation.affordable import FINE
-from adv2e.diagnosis.simulation.frames import FrameCache, Instants, events_of
 from adv2e.effects.frames.misregistration import shifted
-from adv2e.pixel.steps import Coarseness
+from adv2e.effects.hooks import Hooks
+from adv2e.effects.readout.frame_coupling import FrameCouplingHooks
+from adv2e.events import Events
+from adv2e.light.interpolation import make_upsampler
+from adv2e.light.interpolation.linear import Timed, instant_ns, neighbours
+from adv2e.pixel.steps import PRECISE, Coarseness
 
 # ---- Progress of a diagnosis.
 
@@ -118,3 +128,164 @@ class Simulator:
     def map(self, work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:
         """Return ``work`` of each row of the columns, worked on at the same time."""
         return list(self._pool.map(work, *columns))
+
+
+# ---- Frames made once for many simulations, where making them takes longer than all else.
+#
+# Sharp frames, and those along the motion, depend on the frames and their exposure alone, so they
+# can be given to the pixels as if they had been recorded. What else acts on the light of each
+# frame is laid over them: it moves the motion that is found by next to nothing. A picture that is
+# moved is made once, too, from those.
+
+
+Instants = tuple[list[int], NDArray[np.float32]]
+"""Times [ns], and the light at them [DN], (instants, rows, columns)."""
+
+_KEPT = 4
+"""Ways to make frames of which they are kept: those tried one beside another."""
+
+
+class FrameCache:
+    """Frames of a recording, read and made once for each way to do that; for many threads."""
+
+    def __init__(self) -> None:
+        self._made: dict[Any, Instants] = {}
+        self._moved: dict[Any, Instants] = {}
+        self._lock = threading.Lock()
+
+    def of(self, config: Config, read: Callable[[], Instants]) -> Instants:
+        """Return the frames, as `read` does, and what is :func:`made` of them where that is done.
+
+        They are for :func:`events_of`.
+        """
+        frames, sampling = config.frames, config.sampling
+        once = is_made_once(config)
+        how = (sampling, frames.exposure_us) if once else None
+        key, acting = (frames.encoding, frames.full_scale, how), _until_moved(config)
+
+        def in_place() -> Instants:
+            return _held(self._made, key, lambda: made(config, *read()) if once else read())
+
+        def moved() -> Instants:
+            times_ns, light = in_place()
+            return times_ns, _after(acting, config, times_ns, light)
+
+        with self._lock:
+            return _held(self._moved, (key, acting), moved) if _is_moved(config) else in_place()
+
+
+def _held(held: dict[Any, Instants], key: Any, make: Callable[[], Instants]) -> Instants:
+    """Return the cached value of a key, made by `make` if there is none; the oldest are dropped."""
+    found = held.pop(key, None) or make()
+    while len(held) >= _KEPT:
+        del held[next(iter(held))]
+    held[key] = found
+    return found
+
+
+def events_of(
+    instants: Instants,
+    config: Config,
+    *,
+    threads: int | None = None,
+    coarseness: Coarseness = PRECISE,
+) -> Events:
+    """Return the events of frames that were made once for a configuration, (n,), sorted.
+
+    `instants`: as :meth:`FrameCache.of` returns them, or the first of them.
+    """
+    lean, effects = _as_recorded(config)
+    frames = zip(*instants, strict=True)
+    hooks = active_hooks(lean, effects)
+    chunks = events_from_light(frames, lean, hooks=hooks, threads=threads, coarseness=coarseness)
+    return np.concatenate(list(chunks))
+
+
+def is_made_once(config: Config) -> bool:
+    """Tell whether sharp or in-between frames may be given as frames.
+
+    Not where an effect needs to know which of them were recorded, and not where making them costs
+    nothing: linear interpolation, of frames as they are.
+    """
+    sampling, user, coupling = config.sampling, getattr(config, "user", None), coupling_of(config)
+    # which were recorded is counted, and intervals differ in number
+    uneven = sampling.max_motion_px is not None
+    return (
+        (_is_along_motion(config) or config.frames.exposure_us > 0.0)
+        and sampling.last_interval != "printed"
+        and not (uneven and coupling is not None and coupling.amplitude)
+        and not any(getattr(user, name) is not None for name in user_effects(config))
+    )
+
+
+def _is_along_motion(config: Config) -> bool:
+    return config.sampling.interpolation != "linear" and config.sampling.L > 1
+
+
+def _is_moved(config: Config) -> bool:
+    """Tell whether moved frames may be given as frames: frames that are already sharp may."""
+    return any(config.frames.shift_px) and (
+        is_made_once(config) or config.frames.exposure_us == 0.0
+    )
+
+
+def _until_moved(config: Config) -> Frames:
+    """Return the frame settings that act on light up to the shift: black level, depth, shift."""
+    frames = config.frames
+    return Frames(
+        black_level_dn=frames.black_level_dn,
+        black_depth_dn=frames.black_depth_dn,
+        shift_px=frames.shift_px,
+    )
+
+
+def _after(
+    acting: Frames, config: Config, times_ns: list[int], light: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Return the light of frames after some of the effects on it."""
+    frames: Iterator[Timed] = zip(times_ns, light, strict=True)
+    for hook in frame_hooks(acting, config.sampling):
+        frames = hook.light(frames)
+    return np.array([one for _, one in frames], np.float32)
+
+
+def made(config: Config, times_ns: list[int], light: NDArray[np.float32]) -> Instants:
+    """Return the frames, sharp where they are exposed, and what is between them.
+
+    Linear interpolation is left to the pixels.
+    """
+    sharp = _after(Frames(exposure_us=config.frames.exposure_us), config, times_ns, light)
+    if not _is_along_motion(config):
+        return times_ns, sharp
+    upsampler = make_upsampler(config.sampling)
+    times: list[int] = []
+    found: list[NDArray[np.float32]] = []
+    for (t0, first), (t1, second), beside in neighbours(zip(times_ns, sharp, strict=True)):
+        if not times:
+            times.append(t0)
+            found.append(first)
+        count = upsampler.count(first, second, beside)
+        times += [instant_ns(t0, t1, k, count) for k in range(1, count + 1)]
+        found += list(upsampler.between(first, second, beside))
+    return times, np.array(found, np.float32)
+
+
+def _as_recorded(config: Config) -> tuple[Config, list[Hooks]]:
+    """Return `config` for what is made once: frames sharp and in place, and all between them.
+
+    And the effects on other than frames that need to know how these were recorded.
+    """
+    frames, sampling, readout = config.frames, config.sampling, config.readout
+    effects: list[Hooks] = []
+    if is_made_once(config):
+        coupling = coupling_of(config)
+        if readout is not None and coupling is not None and coupling.amplitude:
+            every = sampling.L if _is_along_motion(config) else 1
+            effects.append(FrameCouplingHooks(coupling, 0.5 * frames.exposure_us, every))
+            readout = replace(readout, frame_coupling=None)
+        frames = replace(frames, exposure_us=0.0)
+        if _is_along_motion(config):
+            sampling = Sampling(L=1, K=sampling.K, last_interval=sampling.last_interval)
+    if _is_moved(config):
+        frames = replace(frames, black_level_dn=0.0, black_depth_dn=0.0, shift_px=(0.0, 0.0))
+    return replace(config, frames=frames, sampling=sampling, readout=readout), effects

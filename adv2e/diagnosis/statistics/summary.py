@@ -14,12 +14,21 @@ from adv2e.diagnosis.data.scene import Placed, Scene
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.simulation.simulator import Simulator
 from adv2e.diagnosis.statistics.groups import Array, Entry, Group
-from adv2e.diagnosis.statistics.intervals import intervals, neighbours, runs
 from adv2e.diagnosis.statistics.pixels import count_pixels, pixels
 from adv2e.diagnosis.statistics.rates import course, load, phase, rate_hz, rates, since_leap
 from adv2e.diagnosis.statistics.spectrum import spectrum
-from adv2e.diagnosis.statistics.stamps import gaps, row_gaps, ticks
-from adv2e.diagnosis.statistics.timing import Slopes, drift, lag, shift
+from adv2e.diagnosis.statistics.timing import (
+    Slopes,
+    drift,
+    gaps,
+    intervals,
+    lag,
+    neighbours,
+    row_gaps,
+    runs,
+    shift,
+    ticks,
+)
 from adv2e.reports.result import Kind
 
 BOTH = splits.COUNT

@@ -8,10 +8,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.data import splits
-from adv2e.diagnosis.data.scene import BRIGHTNESSES, LIGHT_NAMES, Placed, Scene
-from adv2e.diagnosis.statistics.counting import sum_slopes, sum_slopes_beside
-from adv2e.diagnosis.statistics.groups import Array, Entry, Group, counts, share
-from adv2e.diagnosis.statistics.rates import spans_text
+from adv2e.diagnosis.data.scene import BRIGHTNESSES, LIGHT_NAMES, STILL, Placed, Scene
+from adv2e.diagnosis.statistics.groups import (
+    POLARITIES,
+    Array,
+    Entry,
+    Group,
+    counts,
+    exponential,
+    numbers,
+    share,
+    stabilised,
+)
+from adv2e.diagnosis.statistics.rates import (
+    count_gaps,
+    since_neighbours,
+    spans_text,
+    sum_slopes,
+    sum_slopes_beside,
+)
 from adv2e.reports.quantities import NO_UNIT
 
 LAGS_MS = (-20.0, -8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
@@ -134,3 +149,209 @@ def shift(slopes: Slopes) -> Group:
         return share(raw[1:], raw[0])
 
     return Group("place where the light changes", 0.002, entries, count, values)
+
+
+# ---- Times between events of one pixel and of its neighbours, and runs of one polarity.
+
+
+BORDERS_MS = (
+    *(0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0),
+    *(48.0, 64.0, 96.0, 128.0, 192.0, 256.0),
+)
+_REST_MS = (1.0, 4.0, 16.0, 64.0, 256.0)
+_NEIGHBOURS_MS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+_PAIRS = ("OFF-OFF", "ON-OFF", "OFF-ON", "ON-ON")
+
+_LONGEST_GAP_US = 50_000
+_PLACES = ("1st", "2nd", "3rd", "4th", "5th-6th", "7th-9th", "10th or later")
+_PLACE_OF = np.array([0, 1, 2, 3, 4, 4, 5, 5, 5, 6])
+
+
+def _bins_text(borders_ms: Sequence[float]) -> list[str]:
+    low = [0.0, *borders_ms]
+    bins = [f"{a:g}-{b:g} ms" for a, b in zip(low, borders_ms, strict=False)]
+    return [*bins, f"> {borders_ms[-1]:g} ms"]
+
+
+def intervals(*, at_rest: bool = False) -> Group:
+    """Return the histogram of the time since the pixel's event before, by both polarities."""
+    borders_ms, where = (_REST_MS, " at rest") if at_rest else (BORDERS_MS, "")
+    borders_us = np.round(np.array(borders_ms) * 1e3).astype(np.int64)
+    longest_us = borders_us[-1]
+    bin_of = np.searchsorted(borders_us, np.arange(longest_us + 1), "right")
+    entries = numbers(
+        (
+            (
+                f"{pair} after {text}{where}",
+                f"pairs of events of a pixel{where}, {text} apart, {pair.replace('-', ' then ')}",
+            )
+            for text in _bins_text(borders_ms)
+            for pair in _PAIRS
+        ),
+        "pairs",
+    )
+
+    def count(placed: Placed) -> Array:
+        stream = placed.stream
+        used = stream.since >= 0
+        if at_rest:
+            used &= placed.speed == STILL
+        gap = bin_of[np.minimum(stream.since[used], longest_us)]
+        cell = gap * 4 + stream.on[used] * 2 + stream.on_before[used]
+        return counts(placed.part[used], cell, len(entries))
+
+    return Group("time between events of a pixel", 0.6, entries, count, kind="time")
+
+
+def runs() -> Group:
+    """Return numbers of events by their place in a run of one polarity, which resets change."""
+    entries = numbers(
+        (
+            f"{place} {p} event of a run",
+            f"{p} events that are the {place} of their polarity in a row, without a gap of 50 ms",
+        )
+        for place in _PLACES
+        for p in POLARITIES
+    )
+
+    def count(placed: Placed) -> Array:
+        stream = placed.stream
+        gap, on = stream.since, stream.on
+        begins = (gap < 0) | (gap > _LONGEST_GAP_US) | (on != stream.on_before)
+        order, index = stream.by_pixel, np.arange(len(stream))
+        start = np.maximum.accumulate(np.where(begins[order], index, 0))
+        place = _PLACE_OF[np.minimum(index - start, 9)]
+        return counts(placed.part[order], place * 2 + on[order], len(entries))
+
+    return Group("runs of one polarity", 0.6, entries, count, kind="time")
+
+
+def neighbours() -> Group:
+    """Return the histogram of the time since an event of a neighbouring pixel."""
+    entries = numbers(
+        (
+            f"{text} after a neighbour's {kind}",
+            f"events {text} after the last event of the {kind} polarity in the four pixels beside",
+        )
+        for kind in ("other", "same")
+        for text in _bins_text(_NEIGHBOURS_MS)
+    )
+    borders_us = np.round(np.array(_NEIGHBOURS_MS) * 1e3).astype(np.int64)
+    bins = len(borders_us) + 1
+
+    def count(placed: Placed) -> Array:
+        stream = placed.stream
+        since = np.empty((len(stream), 2), np.int64)
+        last = np.full((stream.width * stream.height, 2), -(1 << 60), np.int64)
+        since_neighbours(stream.t, stream.pixel, stream.on, stream.width, last, since)
+        cell = np.searchsorted(borders_us, since, "right")
+        return np.concatenate([counts(placed.part, one, bins) for one in cell.T], axis=1)
+
+    return Group("neighbouring pixels", 0.6, entries, count, kind="time")
+
+
+# ---- Stamps of neighbouring events in the stream: what a readout does to them.
+
+
+TICKS_US = (2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
+_ON_TICK = np.array([[t % tick == 0 for tick in TICKS_US] for t in range(TICKS_US[-1])], float)
+_GAPS_US = (1, 2, 3, 5, 8, 12, 20, 40, 80, 160)
+_NEAR_US = (3, 12, 40, 160)
+_QUANTILES = (0.1, 0.25, 0.5, 0.75)
+_BIN_BORDERS_US = np.r_[
+    np.arange(-0.5, 100.0), np.unique(np.rint(np.geomspace(100.0, 1e5, 100)))[1:] + 0.5
+]
+"""Of the gaps counted: each of whole microseconds by itself, longer ones within 7 %, up to 0.1 s.
+
+No readout takes as long; what is longer counts as that.
+"""
+_BIN_OF = np.searchsorted(_BIN_BORDERS_US[1:-1], np.arange(int(_BIN_BORDERS_US[-1]) + 1))
+
+
+def ticks() -> Group:
+    """Return shares of stamps that are whole multiples of a time."""
+    entries = [
+        Entry(
+            f"stamps on {tick} us",
+            f"share of time stamps that are multiples of {tick} us",
+            "of all stamps",
+        )
+        for tick in TICKS_US
+    ]
+
+    def count(placed: Placed) -> Array:
+        # all ticks divide the largest one
+        number = counts(placed.part, placed.stream.t % TICKS_US[-1], TICKS_US[-1])
+        return np.concatenate([number.sum(axis=1)[:, None], number @ _ON_TICK], axis=1)
+
+    return Group(
+        "steps of the time stamps", 0.001, entries, count, lambda raw: share(raw[1:], raw[0])
+    )
+
+
+def gaps() -> Group:
+    """Return times between neighbours in the whole stream, and how often they share a row."""
+    bins = [f"{a}-{b} us" for a, b in zip((0, *_GAPS_US), _GAPS_US, strict=False)]
+    entries = numbers(
+        (f"next after {gap}", f"events {gap} after the event before, of any pixel")
+        for gap in (*bins, f">= {_GAPS_US[-1]} us")
+    )
+    entries += [
+        Entry(
+            f"same row within {n} us",
+            f"share that follows an event of its own row, of events less than {n} us after the one"
+            " before",
+            "of these events",
+        )
+        for n in _NEAR_US
+    ]
+
+    def count(placed: Placed) -> Array:
+        stream = placed.stream
+        number = np.zeros((splits.COUNT, len(_GAPS_US) + 1))
+        rows = np.zeros((splits.COUNT, len(_NEAR_US), 2))
+        count_gaps(
+            stream.t, stream.pixel, placed.part, stream.width,
+            np.array(_GAPS_US), np.array(_NEAR_US), number, rows,
+        )  # fmt: skip
+        return np.concatenate([number, rows.reshape(splits.COUNT, -1)], axis=1)
+
+    def values(raw: Array) -> Array:
+        number, near = raw[: len(_GAPS_US) + 1], raw[len(_GAPS_US) + 1 :]
+        return np.concatenate([stabilised(number), (near[1::2] + 0.5) / (near[::2] + 1.0)])
+
+    return Group("time between events of the sensor", 0.002, entries, count, values, kind="time")
+
+
+def row_gaps() -> Group:
+    """Return quantiles of the times between neighbours in the stream that are of two rows.
+
+    A busy readout gives all of them the time that it takes for a row, however it differs.
+    """
+    entries = [
+        Entry(
+            f"{100 * q:g} % of gaps between rows",
+            f"time from one row to the next that {100 * q:g} % of such times are shorter than",
+            "us",
+            exponential,
+        )
+        for q in _QUANTILES
+    ]
+
+    def count(placed: Placed) -> Array:
+        stream = placed.stream
+        other = np.flatnonzero(np.diff(stream.pixel // stream.width)) + 1
+        gap = np.minimum(stream.t[other] - stream.t[other - 1], len(_BIN_OF) - 1)
+        return counts(placed.part[other], _BIN_OF[gap], len(_BIN_BORDERS_US) - 1)
+
+    def values(raw: Array) -> Array:
+        up_to = np.cumsum(raw)
+        if up_to[-1] == 0.0:
+            return np.zeros(len(_QUANTILES))
+        wanted = np.array(_QUANTILES) * up_to[-1]
+        k = np.searchsorted(up_to, wanted)
+        in_bin = 1.0 - (up_to[k] - wanted) / raw[k]
+        gap = _BIN_BORDERS_US[k] + in_bin * np.diff(_BIN_BORDERS_US)[k]
+        return np.asarray(np.log(np.maximum(gap, 0.5)))
+
+    return Group("time between rows", 0.02, entries, count, values, kind="time")

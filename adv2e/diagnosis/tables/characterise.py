@@ -17,7 +17,8 @@ from adv2e.diagnosis.tables.problem import Array, Declared, Settings, is_key
 from adv2e.diagnosis.tables.selection import Choice, FittedSet, Selector
 from adv2e.diagnosis.tables.table import Table
 from adv2e.errors import DataError
-from adv2e.files.names import shown
+from adv2e.files.regular import shown
+from adv2e.reports.markup import OF_TABLES
 from adv2e.reports.result import (
     Band,
     Curve,
@@ -28,7 +29,6 @@ from adv2e.reports.result import (
     Interval,
     Rejected,
 )
-from adv2e.reports.wording import OF_TABLES
 
 
 def characterise(table: Table, declared: Declared, settings: Settings | None = None) -> Diagnosis:

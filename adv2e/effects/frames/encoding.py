@@ -22,7 +22,7 @@ the scene.  BT.601 and BT.2020 have the curve of BT.709.  pq is the light of a d
 Each colour channel is decoded by itself.  Then the channels are weighed to luma in linear light:
 0.2126 R + 0.7152 G + 0.0722 B, whatever the primaries.  The pixel sees DN = 255 light.
 
-Applied in adv2e/light/decoding.py.
+Applied in adv2e/light/pictures.py.
 
 References
 ----------

@@ -45,8 +45,7 @@ from numpy.typing import NDArray
 
 from adv2e.effects.frames.encoding import LUMA_WEIGHTS, decode_values, encode_light
 from adv2e.errors import ConfigError, DataError, MissingExtraError
-from adv2e.files.names import shown
-from adv2e.files.regular import check_ends
+from adv2e.files.regular import check_ends, shown
 
 MULTIPLE = 64
 """Rows and columns are multiples of it where the file says nothing: enough for RIFE and FILM."""

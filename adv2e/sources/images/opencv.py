@@ -21,7 +21,7 @@ from adv2e.effects.frames.encoding import full_scale_of, is_light
 from adv2e.errors import DataError, MissingExtraError
 from adv2e.process.standard_error import overhearing
 from adv2e.sources.frame import Image, Pixels, check_pixels
-from adv2e.sources.images import tiff
+from adv2e.sources.images import headers
 from adv2e.sources.images.alpha import Alpha, with_alpha
 from adv2e.sources.images.headers import Header, check_size, read_header
 
@@ -99,7 +99,7 @@ def decode_image(data: bytes, label: str) -> Pixels:
         raise DataError(f"{label}: {kinds} are not read; write raw ones, or PNG")
     if data.startswith(b"GIF8") or data[4:12] == b"ftypavis":
         raise DataError(f"{label}: is a GIF or AVIF of pictures, whatever its name; write PNG")
-    if tiff.is_tiff(data):
+    if headers.is_tiff(data):
         return _decode_tiff(data, label)
     header = read_header(data)
     check_size(header.width, header.height, data, label)
@@ -150,7 +150,7 @@ def upright(image: Image, orientation: int) -> Image:
 
 
 def _decode_tiff(data: bytes, label: str) -> Pixels:
-    header = tiff.examine(data, label)
+    header = headers.examine(data, label)
     if header is None:
         raise _unreadable(label)
     image, _, says = _decoded(header.data, label)  # upright
@@ -192,7 +192,7 @@ def _decoded(data: bytes, label: str) -> tuple[Any, int, str]:
         raise _unreadable(label)
     for kind, content in zip(kinds, contents, strict=True):
         if kind == cv2.IMAGE_METADATA_EXIF:
-            orientation = tiff.orientation(content.tobytes().removeprefix(b"Exif\0\0"))
+            orientation = headers.orientation(content.tobytes().removeprefix(b"Exif\0\0"))
         elif kind == cv2.IMAGE_METADATA_ICCP:
             says = "its colour profile is not read"
     return image, orientation, says

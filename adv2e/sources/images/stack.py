@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import IO
 
 from adv2e.errors import DataError
+from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.frame import Pixels
+from adv2e.sources.images.headers import is_tiff
 from adv2e.sources.images.opencv import decode_image
-from adv2e.sources.images.tiff import is_tiff
 from adv2e.sources.listed import ListedSource, Picture
 from adv2e.sources.npy import timed_beside
-from adv2e.sources.wanted import GivenTimes, Selection
 
 # ---- Pages of a TIFF, each as a file of its own: no more than one is in memory.
 #

@@ -12,15 +12,22 @@ from pathlib import Path
 from adv2e.errors import DataError
 from adv2e.geometry import Size
 from adv2e.process.signals import first_interrupt
-from adv2e.sources.base import Source
+from adv2e.sources.base import GivenTimes, Selection, Source
 from adv2e.sources.bayer import in_colour, light_of
 from adv2e.sources.frame import Shot
-from adv2e.sources.pipes.raw import PIXEL_FORMATS, raw_layout
-from adv2e.sources.pipes.stream import NAME, Layout, Stream, standard_input
-from adv2e.sources.pipes.y4m import LONGEST_LINE, MAGIC, y4m_layout
+from adv2e.sources.pipes.stream import (
+    LONGEST_LINE,
+    MAGIC,
+    NAME,
+    PIXEL_FORMATS,
+    Layout,
+    Stream,
+    raw_layout,
+    standard_input,
+    y4m_layout,
+)
 from adv2e.sources.times.lists import read_list
 from adv2e.sources.times.rates import Stamp
-from adv2e.sources.wanted import GivenTimes, Selection
 
 _A_MOMENT_S = 0.2
 """A terminal interrupts one process after the other: a producer may end before we hear of it."""

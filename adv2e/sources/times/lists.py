@@ -1,7 +1,7 @@
 """Lists of frames in text files: the time of each, and which image is meant.
 
 The columns are told apart first; the unit of the times is settled in
-:mod:`adv2e.sources.times.units`.
+:mod:`adv2e.sources.times.rates`.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from unicodedata import normalize
 
 from adv2e.errors import DataError
 from adv2e.files.regular import read_text_bytes
-from adv2e.sources.times.rates import NUMBER, Stamp, parse_ns, seconds
-from adv2e.sources.times.units import Unit, frame_unit
+from adv2e.sources.times.rates import NUMBER, Stamp, Unit, frame_unit, parse_ns, seconds
 
 # ---- Pictures by the names in a list.
 #
@@ -409,7 +408,7 @@ def parse_list(
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         What the user says of the unit.
     stated, own_step_s
-        What else tells of it; see :func:`adv2e.sources.times.units.frame_unit`.
+        What else tells of it; see :func:`adv2e.sources.times.rates.frame_unit`.
 
     Raises
     ------

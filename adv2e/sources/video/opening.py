@@ -22,7 +22,7 @@ import av.logging
 from av.stream import Disposition
 
 from adv2e.errors import DataError
-from adv2e.sources.tracks import Track, choose
+from adv2e.sources.frame import Track, choose
 
 FORMATS = (
     *("mov", "avi", "matroska", "mpegts", "mpeg", "flv", "asf", "ogg", "gif", "apng", "dv", "ivf"),

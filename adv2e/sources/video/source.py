@@ -15,15 +15,13 @@ from typing import Any
 import av
 
 from adv2e.errors import DataError
-from adv2e.sources.base import Source
+from adv2e.sources.base import GivenTimes, Selection, Source
 from adv2e.sources.frame import Light, Shot
-from adv2e.sources.times.gaps import gap_doubts
 from adv2e.sources.times.lists import read_list
-from adv2e.sources.times.rates import NS_PER_S, Stamp, seconds
+from adv2e.sources.times.rates import NS_PER_S, Stamp, gap_doubts, seconds
 from adv2e.sources.video.listing import Listing, list_pictures
 from adv2e.sources.video.opening import Video, opened
 from adv2e.sources.video.pictures import Converter, encoding_of, is_stated, oddly_shown
-from adv2e.sources.wanted import GivenTimes, Selection
 
 _FIELDS = (
     "interlaced: each picture is taken whole, with the two fields that it has of different times;"

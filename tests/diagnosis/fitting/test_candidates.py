@@ -13,7 +13,7 @@ from adv2e.diagnosis.fitting.candidates import Candidate, neutral_value
 from adv2e.diagnosis.fitting.library import library, names
 from adv2e.diagnosis.hints.collect import Hints
 from adv2e.diagnosis.hints.lamps import Lamp
-from adv2e.reports.keys import known_keys
+from adv2e.reports.markup import known_keys
 
 HINTS = Hints(0.3, (Lamp(100.0), Lamp(63.5, 1.2)), 10)
 CONFIGS = [None, *(name for name in shipped() if not load_family(name).forms)]

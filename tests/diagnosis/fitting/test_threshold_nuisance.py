@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from adv2e.config import load_config
-from adv2e.diagnosis.fitting.nuisances import TOLERANCE, fit_thresholds, thresholds_of
+from adv2e.diagnosis.fitting.fitter import TOLERANCE, fit_thresholds, thresholds_of
 
 
 def counts_of(config):

@@ -5,7 +5,7 @@ from made_up.sampler import EFFECTS, STATISTICS, MadeUpSampler, candidates, sear
 
 from adv2e.config import Config
 from adv2e.diagnosis.configurations import with_keys
-from adv2e.diagnosis.outcome.detectable import detectable
+from adv2e.diagnosis.outcome.verdict import detectable
 from adv2e.diagnosis.selection.search import PER_LOOK
 from adv2e.diagnosis.statistics.summary import BOTH
 

@@ -9,7 +9,7 @@ from made_up.streams import HEIGHT, WIDTH, random_stream, stream_of
 from adv2e.comparison.distances import SIGMAS_US, smoothed_errors, smoothed_norms
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.splits import Split
-from adv2e.diagnosis.outcome.error import (
+from adv2e.diagnosis.outcome.verdict import (
     NAME,
     OF_MEAN,
     PAIRS,

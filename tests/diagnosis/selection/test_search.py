@@ -25,11 +25,10 @@ from adv2e.config import Config, load_config
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 from adv2e.diagnosis.fitting.fitted import Fitted
+from adv2e.diagnosis.fitting.fitter import threshold_nuisance, thresholds_of
 from adv2e.diagnosis.fitting.library import library
-from adv2e.diagnosis.fitting.nuisances import threshold_nuisance, thresholds_of
-from adv2e.diagnosis.outcome.detectable import detectable
 from adv2e.diagnosis.outcome.findings import finding_of
-from adv2e.diagnosis.outcome.verdict import verdict_of
+from adv2e.diagnosis.outcome.verdict import detectable, verdict_of
 from adv2e.diagnosis.selection import joint_fits as joint_fits_module
 from adv2e.diagnosis.selection.acceptance import BY_CHANCE, objections
 from adv2e.diagnosis.selection.reference import Rejections

@@ -222,7 +222,7 @@ UNEVEN = ["sampling.max_motion_px=0.7"]
 def test_frames_along_the_motion_are_made_once_and_the_same(monkeypatch, exposed):
     made = []
     monkeypatch.setattr(
-        "adv2e.diagnosis.simulation.frames.make_upsampler",
+        "adv2e.diagnosis.simulation.simulator.make_upsampler",
         lambda *arguments: made.append(1) or make_upsampler(*arguments),
     )
     frames = [moving(k) for k in range(8)]
@@ -244,7 +244,7 @@ def test_frames_along_the_motion_are_made_once_and_the_same(monkeypatch, exposed
 def test_frames_are_made_sharp_once_and_the_same(monkeypatch):
     made = []
     monkeypatch.setattr(
-        "adv2e.diagnosis.simulation.frames.frame_hooks",
+        "adv2e.diagnosis.simulation.simulator.frame_hooks",
         lambda frames, sampling: made.append(frames.exposure_us) or frame_hooks(frames, sampling),
     )
     simulator = Simulator(EVIDENCE, 2)
@@ -298,7 +298,7 @@ def test_frames_are_moved_once_and_the_same(monkeypatch, beside):
 
 
 def test_where_nothing_is_between_the_frames_they_are_the_recorded_ones(simulator, monkeypatch):
-    monkeypatch.setattr("adv2e.diagnosis.simulation.frames.made", None)
+    monkeypatch.setattr("adv2e.diagnosis.simulation.simulator.made", None)
     assert len(simulator.stream(load_config([], [*FLOW, "sampling.L=1"]), 1)) > 0
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from made_up.streams import HEIGHT, STOP_US, WIDTH, placed, some_scene, streams
 
-from adv2e.diagnosis.statistics import intervals, pixels, rates, spectrum, stamps, timing
+from adv2e.diagnosis.statistics import pixels, rates, spectrum, timing
 
 SCENE = some_scene(seed=5)
 PARTS = 3
@@ -86,11 +86,11 @@ def test_load(stream):
 @given(streams())
 def test_intervals(stream):
     where = placed(stream, SCENE)
-    borders = [round(1000 * border) for border in intervals.BORDERS_MS]
+    borders = [round(1000 * border) for border in timing.BORDERS_MS]
     expected = np.zeros((PARTS, len(borders) + 1, 2, 2))
     for _, gap, on, before, part in histories(where):
         expected[part, sum(gap >= border for border in borders), on, before] += 1
-    same(intervals.intervals().count(where), expected.reshape(PARTS, -1))
+    same(timing.intervals().count(where), expected.reshape(PARTS, -1))
 
 
 @several
@@ -101,11 +101,11 @@ def test_intervals_at_rest(stream):
         if where.speed[k] == 0:
             place = sum(gap >= border for border in (1e3, 4e3, 16e3, 64e3, 256e3))
             expected[part, place, on, before] += 1
-    same(intervals.intervals(at_rest=True).count(where), expected.reshape(PARTS, -1))
+    same(timing.intervals(at_rest=True).count(where), expected.reshape(PARTS, -1))
 
 
 def test_the_order_of_a_pair_is_that_of_its_name():
-    group = intervals.intervals()
+    group = timing.intervals()
     names = [entry.name for entry in group.entries]
     from made_up.streams import stream_of
 
@@ -125,7 +125,7 @@ def test_runs(stream):
         run[pixel] = t, on, length
         place = bisect.bisect_left([1, 2, 3, 4, 6, 9], length)
         expected[part, place, on] += 1
-    same(intervals.runs().count(where), expected.reshape(PARTS, -1))
+    same(timing.runs().count(where), expected.reshape(PARTS, -1))
 
 
 @several
@@ -201,10 +201,10 @@ def test_spectrum(stream):
 @several
 @given(streams())
 def test_ticks(stream):
-    where, expected = placed(stream, SCENE), np.zeros((PARTS, 1 + len(stamps.TICKS_US)))
+    where, expected = placed(stream, SCENE), np.zeros((PARTS, 1 + len(timing.TICKS_US)))
     for t, _, _, part in events(where):
-        expected[part] += [1, *(t % tick == 0 for tick in stamps.TICKS_US)]
-    same(stamps.ticks().count(where), expected)
+        expected[part] += [1, *(t % tick == 0 for tick in timing.TICKS_US)]
+    same(timing.ticks().count(where), expected)
 
 
 @several
@@ -219,7 +219,7 @@ def test_gaps(stream):
         for n, reach in enumerate((3, 12, 40, 160)):
             if gap < reach:
                 near[part, n] += [1, pixel // WIDTH == pixel0 // WIDTH]
-    same(stamps.gaps().count(where), np.hstack([gaps, near.reshape(PARTS, -1)]))
+    same(timing.gaps().count(where), np.hstack([gaps, near.reshape(PARTS, -1)]))
 
 
 @several
@@ -230,7 +230,7 @@ def test_gaps_between_rows(stream):
     for (t0, pixel0, *_), (t, pixel, _, part) in itertools.pairwise(events(where)):
         if pixel // WIDTH != pixel0 // WIDTH:
             found[part].append(t - t0)
-    counted = stamps.row_gaps().count(where)
+    counted = timing.row_gaps().count(where)
     assert list(counted.sum(axis=1)) == [len(gaps) for gaps in found]
     for row, gaps in zip(counted, found, strict=True):
         if gaps:
@@ -238,7 +238,7 @@ def test_gaps_between_rows(stream):
             expected = np.quantile(
                 np.minimum(gaps, longest), [0.1, 0.25, 0.5, 0.75], method="inverted_cdf"
             )
-            off = np.abs(np.exp(stamps.row_gaps().values(row)) - expected)
+            off = np.abs(np.exp(timing.row_gaps().values(row)) - expected)
             assert np.all(off <= 0.501 + 0.08 * expected)  # bins of a microsecond, or of 7 %
 
 
@@ -257,7 +257,7 @@ def test_neighbours(stream):
                     gap = min(gap, t - then)
             borders = (100, 300, 1000, 3000, 10_000, 30_000, 100_000)
             expected[part, same_kind, sum(gap >= border for border in borders)] += 1
-    same(intervals.neighbours().count(where), expected.reshape(PARTS, -1))
+    same(timing.neighbours().count(where), expected.reshape(PARTS, -1))
 
 
 @several

@@ -25,7 +25,7 @@ from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.splits import Split
 from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.hints.lamps import strongest_lines
-from adv2e.diagnosis.statistics import intervals, rates, spectrum, stamps, timing
+from adv2e.diagnosis.statistics import rates, spectrum, timing
 from adv2e.diagnosis.statistics.summary import BOTH, VIEWS, SummaryStatistics
 
 SCENE = some_scene(seed=5)
@@ -304,8 +304,8 @@ def test_spectrum_sees_a_line_of_polarity():
 def test_ticks_see_whole_multiples(tick):
     stream = random_stream(3000, 4)
     ticked = stream_of(stream.t // tick * tick, stream.pixel % WIDTH, stream.pixel // WIDTH, 1)
-    found = statistics(stamps.ticks(), placed(ticked, SCENE))
-    free = statistics(stamps.ticks(), placed(stream, SCENE))
+    found = statistics(timing.ticks(), placed(ticked, SCENE))
+    free = statistics(timing.ticks(), placed(stream, SCENE))
     assert found[f"stamps on {tick} us"] == 1.0
     assert free[f"stamps on {tick} us"] == pytest.approx(1 / tick, abs=0.03)
 
@@ -315,8 +315,8 @@ def test_gaps_see_rows_that_are_read_together():
     t = np.repeat(np.sort(draw.integers(0, STOP_US, 200)), 5) + np.tile(np.arange(5), 200)
     y = np.repeat(draw.integers(0, HEIGHT, 200), 5)
     x = draw.integers(0, WIDTH, 1000)
-    rows = statistics(stamps.gaps(), placed(stream_of(t, x, y, x % 2), SCENE))
-    any_row = statistics(stamps.gaps(), placed(stream_of(t, x, draw.permutation(y), x % 2), SCENE))
+    rows = statistics(timing.gaps(), placed(stream_of(t, x, y, x % 2), SCENE))
+    any_row = statistics(timing.gaps(), placed(stream_of(t, x, draw.permutation(y), x % 2), SCENE))
     assert rows["same row within 3 us"] > 0.9
     assert any_row["same row within 3 us"] < 0.2
     assert rows["next after 1-2 us"] > 50
@@ -329,7 +329,7 @@ def test_gaps_between_rows_see_the_time_that_a_row_takes(row_us):
     t = np.arange(rows) * row_us
     y = np.arange(rows) % HEIGHT
     where = placed(stream_of(t, draw.integers(0, WIDTH, rows), y, 1), SCENE)
-    found = statistics(stamps.row_gaps(), where)
+    found = statistics(timing.row_gaps(), where)
     for name in ("25 % of gaps between rows", "50 % of gaps between rows"):
         assert np.exp(found[name]) == pytest.approx(row_us, rel=0.05)
 
@@ -340,8 +340,8 @@ def test_neighbours_see_pairs():
     x, y = draw.integers(0, WIDTH - 1, 400), draw.integers(0, HEIGHT, 400)
     on = draw.integers(0, 2, 400)
     both = np.r_[t, t + 200], np.r_[x, x + 1], np.r_[y, y]
-    same = statistics(intervals.neighbours(), placed(stream_of(*both, np.r_[on, on]), SCENE))
-    other = statistics(intervals.neighbours(), placed(stream_of(*both, np.r_[on, 1 - on]), SCENE))
+    same = statistics(timing.neighbours(), placed(stream_of(*both, np.r_[on, on]), SCENE))
+    other = statistics(timing.neighbours(), placed(stream_of(*both, np.r_[on, 1 - on]), SCENE))
     name = "0.1-0.3 ms after a neighbour's {}"
     assert same[name.format("same")] > 30 > 3 * same[name.format("other")]
     assert other[name.format("other")] > 30 > 3 * other[name.format("same")]
@@ -349,8 +349,8 @@ def test_neighbours_see_pairs():
 
 def test_runs_see_how_far_one_goes():
     t = 1000 * np.arange(12)
-    found = statistics(intervals.runs(), placed(stream_of(t, [3] * 12, [3] * 12, [1] * 12), SCENE))
-    nothing = statistics(intervals.runs(), placed(stream_of([], [], [], []), SCENE))
+    found = statistics(timing.runs(), placed(stream_of(t, [3] * 12, [3] * 12, [1] * 12), SCENE))
+    nothing = statistics(timing.runs(), placed(stream_of([], [], [], []), SCENE))
     grown = {name for name in found if found[name] > nothing[name]}
     places = ("1st", "2nd", "3rd", "4th", "5th-6th", "7th-9th", "10th or later")
     assert grown == {f"{place} ON event of a run" for place in places}

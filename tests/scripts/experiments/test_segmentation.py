@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from adv2e.errors import DataError
 from adv2e.events import cut, make_events
-from adv2e.representations.event_images import event_image
+from adv2e.representations.voxel_grid import event_image
 
 torch = pytest.importorskip("torch", reason="PyTorch (extra experiments) is too large for all")
 pytest.importorskip("skimage", reason="scipy and scikit-image are of the extra experiments")

@@ -18,9 +18,9 @@ from adv2e.formats.reading import read_events
 from adv2e.geometry import Size
 from adv2e.options import PIXEL_FORMATS as NAMES
 from adv2e.sources import open_source
-from adv2e.sources.pipes.raw import PIXEL_FORMATS
+from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.pipes.source import open_source as open_pipe
-from adv2e.sources.wanted import GivenTimes, Selection
+from adv2e.sources.pipes.stream import PIXEL_FORMATS
 
 
 def y4m(frames, tags="W8 H6 F25:1 Ip C420jpeg", marker="FRAME\n"):

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from adv2e.sources import open_source
-from adv2e.sources.times.gaps import gap_doubts, numbering_doubt
-from adv2e.sources.times.rates import FrameRate
+from adv2e.sources.times.rates import FrameRate, gap_doubts, numbering_doubt
 
 MS = 10**6
 

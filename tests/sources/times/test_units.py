@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adv2e.sources.times.units import UNITS, Unit, frame_unit
+from adv2e.sources.times.rates import UNITS, Unit, frame_unit
 
 UNIT = st.sampled_from(list(UNITS))
 EPOCH_S = 1_468_941_032
