@@ -11,8 +11,8 @@ from adv2e.effects.pixel.low_pass import UPDATES
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
 from adv2e.errors import UsageError
 from adv2e.kernel import rng
-from adv2e.kernel.circuit import Circuit
 from adv2e.kernel.exact import covers
+from adv2e.kernel.inputs import Circuit
 
 _NO_KNEE = 1e300
 _PER_US = 1e-6

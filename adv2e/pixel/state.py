@@ -15,7 +15,7 @@ from adv2e.config.model import Pixel
 from adv2e.effects.pixel.initial_reference import RANDOM, RUNNING
 from adv2e.effects.pixel.thresholds import FLOOR
 from adv2e.kernel import per_pixel
-from adv2e.kernel.circuit import Circuit
+from adv2e.kernel.inputs import Circuit
 from adv2e.kernel.leak import fill_first_factors, fill_running
 from adv2e.kernel.noise import (
     fill_first_candidates,
