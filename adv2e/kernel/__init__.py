@@ -11,18 +11,18 @@ Two solvers, each a strip of pixels at a time through all intervals:
 
 and what they share:
 
-``circuit``         parameters of the circuit
+``inputs``          parameters of the circuit, frames and intervals, and the light of a strip
 ``per_pixel``       rows of the state of each pixel; initial thresholds (mismatch) and reference
-``comparator``      tolerance of a crossing, how an event fires, and memory for events, which grows;
-                    ``causes`` says why it fires
+``comparator``      tolerance of a crossing, how an event fires and why, and memory for events,
+                    which grows
 ``leak``, ``noise``  fall of the reference by leak; shot noise, hot pixels, photoreceptor noise
 ``quadrature``      Gauss rules for the lag at the end of an interval, or of a dead time
 ``special``         exponential and logarithm that vectorise and give the same bits everywhere
 ``rng``             random numbers as functions of seed, effect, pixel and draw
-``frames``          frames, and the light of a strip; ``work_queue`` hands strips out to threads
+``work_queue``      strips handed out to threads
 ``packing``         packed events into order
 
-Beside the pixel, ``frame_effects`` and ``arbiter`` hold the loops of effects on frames and events.
+Beside the pixel, ``effect_loops`` holds the loops of effects on frames and events.
 
 Where the time goes
 -------------------

@@ -17,10 +17,9 @@ from adv2e.kernel import per_pixel, screen, static_pixels
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.cascade import advance as cascade
 from adv2e.kernel.cascade import screen as cascade_screen
-from adv2e.kernel.circuit import EXACT, Circuit
 from adv2e.kernel.comparator import with_room
-from adv2e.kernel.frames import Interval, load
-from adv2e.kernel.lanes import batch, exchange, rows
+from adv2e.kernel.inputs import EXACT, Circuit, Interval, load
+from adv2e.kernel.lanes import batch, rows
 from adv2e.kernel.leak import leak_strip, leaks, lower_references
 from adv2e.kernel.photoreceptor import strip as photoreceptor
 from adv2e.kernel.quadrature import Rule
@@ -102,7 +101,7 @@ def _open_strip(lo, count, start, circuit, state, strip, noise):
         strip[cascade_screen.SECOND + k] = state[per_pixel.SECOND, lo + k]
     for k in range(count):
         i = lo + k
-        exchange.watch(k, i, state[per_pixel.X, i], start, circuit, state, strip)
+        screen.watch(k, i, state[per_pixel.X, i], start, circuit, state, strip)
         strip[screen.AWAY_0 + k] = strip[screen.AWAY_1 + k]
     # the rest of the last strip must be harmless
     for k in range(count, STRIP):
@@ -129,7 +128,7 @@ def _close_strip(lo, count, piece, circuit, state, strip, noise):
     for k in range(count):
         state[per_pixel.LAG, lo + k] = strip[screen.LAG_0 + k]
         state[per_pixel.SECOND, lo + k] = strip[cascade_screen.SECOND + k]
-        state[per_pixel.X, lo + k] = exchange.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
+        state[per_pixel.X, lo + k] = screen.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
 
 
 @kernel
@@ -143,8 +142,8 @@ def _screen(strip, end, length, circuit, rule):
 @kernel
 def _solve_flagged(lo, m, interval, circuit, rule, state, memory, buffer, n):
     """Solve the m pixels whose numbers are in memory.pixels, in lanes."""
-    waiting = exchange.held_first(m, memory.rows, memory.pixels)
-    exchange.load(lo, m, interval, circuit, state, memory)
+    waiting = batch.held_first(m, memory.rows, memory.pixels)
+    batch.load(lo, m, interval, circuit, state, memory)
     while True:
         buffer = with_room(buffer, n, n + 2 * m)
         m, n = batch.decide(lo, m, waiting, interval, circuit, rule, state, memory, buffer, n)
@@ -165,7 +164,7 @@ def _advance_strip(lo, count, interval, circuit, rule, state, memory, buffer, n)
     if m > 0:
         n, buffer = _solve_flagged(lo, m, interval, circuit, rule, state, memory, buffer, n)
     if has_leak:
-        lower_references(lo, count, state, memory)
+        lower_references(lo, 0, count, state, memory)
     screen.step_on(strip)
     return n, buffer
 

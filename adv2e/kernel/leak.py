@@ -50,9 +50,9 @@ def leak_over(length, circuit):
 
 
 @kernel
-def fill_falls(lo, count, length, mean, circuit, state, falls):
-    """Fall of the reference over an interval of `length` us: pixels lo.., mean light [DN]."""
-    on = state[per_pixel.ON, lo : lo + count]
+def fill_falls(i, b, count, length, circuit, state, memory):
+    """Fall of the references over `length` us, from pixel b of a strip on, which is i of all."""
+    on, falls, mean = state[per_pixel.ON, i : i + count], memory.falls[b:], memory.means[b:]
     constant, per_dn = leak_over(length, circuit)
     if per_dn > 0.0:
         for k in range(count):
@@ -61,7 +61,7 @@ def fill_falls(lo, count, length, mean, circuit, state, falls):
         for k in range(count):
             falls[k] = on[k] * constant
     if circuit.leak_jitter > 0.0:
-        factor = state[per_pixel.LEAK_FACTOR, lo : lo + count]
+        factor = state[per_pixel.LEAK_FACTOR, i : i + count]
         for k in range(count):
             falls[k] *= factor[k]
 
@@ -85,21 +85,21 @@ def _mean_lights(strip, knee_dn, means):
 @kernel
 def leak_strip(lo, count, length, circuit, state, memory):
     """Fall of the reference of a strip over `length` us, with the light of the screen's rows."""
-    strip, falls, means = memory.rows, memory.falls, memory.means
+    strip, falls = memory.rows, memory.falls
     if circuit.photo_leak > 0.0:
-        _mean_lights(strip, _f(circuit.slope * circuit.knee), means)
-    fill_falls(lo, count, length, means, circuit, state, falls)
+        _mean_lights(strip, _f(circuit.slope * circuit.knee), memory.means)
+    fill_falls(lo, 0, count, length, circuit, state, memory)
     for k in range(count):
         strip[screen.FALL + k] = falls[k]
 
 
 @kernel
-def lower_references(lo, count, state, memory):
-    """Take the fall from the references of the pixels that are done."""
-    strip, falls = memory.rows, memory.falls
-    reference = state[per_pixel.REFERENCE, lo : lo + count]
+def lower_references(i, b, count, state, memory):
+    """Take the fall from the references of the pixels that are not flagged."""
+    falls, reference = memory.falls[b:], state[per_pixel.REFERENCE, i : i + count]
+    hit = memory.rows[screen.HIT + b : screen.HIT + b + count]
     for k in range(count):
-        fall = falls[k] if strip[screen.HIT + k] == 0.0 else 0.0
+        fall = falls[k] if hit[k] == 0.0 else 0.0
         reference[k] -= fall
 
 

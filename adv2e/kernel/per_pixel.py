@@ -29,7 +29,7 @@ ROWS = 22
     FIRST,  # signal behind the first pole, as the stepped solver keeps it
     SECOND,  # the same behind the second pole
     BEYOND,  # where the reference goes beyond the signal at the end of the dead time
-    # for the causes of events alone: see adv2e.kernel.causes
+    # for the causes of events alone: see adv2e.kernel.comparator
     RESET,  # the reference as it was at its reset, NEVER in the dead time
     RESET_LIGHT,  # and what it was made of: signal by the light alone,
     RESET_NOISE,  # photoreceptor noise,

@@ -44,7 +44,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.compiled import kernel
-from adv2e.kernel import special
+from adv2e.kernel import per_pixel, special
+from adv2e.kernel.noise import next_noise
 from adv2e.kernel.quadrature import REACH
 from adv2e.kernel.work_queue import STRIP
 
@@ -62,6 +63,9 @@ AT_REST = 1e-10
 
 NEVER = 1e30
 """Distance, or time, that is not reached."""
+
+EARLY = 1.0 - 1e-6
+"""Factor on due times: single precision must not make them late."""
 
 STRIDE = STRIP + 16  # one cache line more: rows must not share cache sets
 (
@@ -108,6 +112,32 @@ def new_rows() -> NDArray[np.float32]:
     for row in (ON, OFF, DUE):
         strip[row : row + STRIDE] = NEVER
     return strip
+
+
+@kernel
+def log_of(light, circuit):
+    """Log intensity of light [DN] as loaded."""
+    safe = light if light > 1e-30 else 1e-30
+    x = special.log(safe)
+    if circuit.slope > 0.0:
+        x = x if light >= circuit.slope * circuit.knee else light / circuit.slope
+    return x
+
+
+@kernel
+def watch(k, i, x1, start, circuit, state, strip):
+    """Rows of the screen for pixel k of a strip, i of the state: distance, thresholds, due time."""
+    strip[AWAY_1 + k] = x1 - state[per_pixel.REFERENCE, i]
+    hold = state[per_pixel.HOLD, i]
+    if hold >= 0.0:
+        strip[ON + k] = NEVER
+        strip[OFF + k] = NEVER
+        strip[DUE + k] = (hold - start) * EARLY
+    else:
+        strip[ON + k] = state[per_pixel.ON, i] - MARGIN
+        strip[OFF + k] = state[per_pixel.OFF, i] - MARGIN
+        due = next_noise(i, circuit, state)[1]
+        strip[DUE + k] = min(due - start, NEVER) * EARLY
 
 
 @kernel

@@ -15,12 +15,11 @@ from adv2e.causes import SIGNAL
 from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, screen
 from adv2e.kernel.borrowing import borrowed
-from adv2e.kernel.causes import cause_by_leak, note_reset
-from adv2e.kernel.comparator import TIE, fire, with_room
-from adv2e.kernel.frames import Interval
-from adv2e.kernel.lanes.exchange import EARLY, log_of, watch
-from adv2e.kernel.leak import fill_falls, leaks
+from adv2e.kernel.comparator import TIE, cause_by_leak, fire, note_reset, with_room
+from adv2e.kernel.inputs import Interval
+from adv2e.kernel.leak import fill_falls, leaks, lower_references
 from adv2e.kernel.noise import NONE, next_noise, noise_within, take_noise
+from adv2e.kernel.screen import EARLY, log_of, watch
 from adv2e.kernel.work_queue import STRIP
 
 BLOCK = 64
@@ -80,26 +79,11 @@ def end_rest(lo, count, circuit, state, strip):
 
 
 @kernel
-def _fall_of_block(i, b, size, length, circuit, state, memory):
-    """Fall of the references of a block, which begins at pixel b of its strip, i of all."""
-    means, falls = memory.means[b : b + size], memory.falls[b : b + size]
-    fill_falls(i, size, length, means, circuit, state, falls)
-
-
-@kernel
 def _lower_block(i, b, size, state, falls):
     """Take the falls from the references of a block."""
     reference, fall = state[per_pixel.REFERENCE, i : i + size], falls[b : b + size]
     for k in range(size):
         reference[k] -= fall[k]
-
-
-@kernel
-def _lower_unflagged(i, b, size, state, strip, falls):
-    """Take the falls from the references of the pixels of a block that are not looked at."""
-    reference, fall = state[per_pixel.REFERENCE, i : i + size], falls[b : b + size]
-    for k in range(size):
-        reference[k] -= fall[k] if strip[screen.HIT + b + k] == _ZERO else 0.0
 
 
 @kernel
@@ -146,14 +130,14 @@ def _solve(k, i, s, interval, circuit, state, memory, buffer, n):
     which to go on.  Leaves the pixel's rows of the screen as they are at the end of the interval.
     """
     strip, falls = memory.rows, memory.falls
-    ta, length = interval.start, interval.length
+    ta, length, most = interval.start, interval.length, buffer.keys.shape[0]
     light = np.float64(strip[screen.LIGHT_1 + k])
     x, fall = log_of(light, circuit), falls[k]
     on, off = state[per_pixel.ON, i] + TIE, state[per_pixel.OFF, i] + TIE
     reference = state[per_pixel.REFERENCE, i]
     noise = next_noise(i, circuit, state)[1]
     while True:
-        if n == buffer.keys.shape[0]:
+        if n == most:
             state[per_pixel.REFERENCE, i] = reference
             return n, s
         hold = state[per_pixel.HOLD, i]
@@ -191,9 +175,9 @@ def _solve(k, i, s, interval, circuit, state, memory, buffer, n):
         when = ta + s * length
         n = fire(i, when, polarity, cause, circuit, state, buffer, n)
         if circuit.leak_jitter > 0.0:
-            _fall_of_block(i, k, 1, 1.0, circuit, state, memory)
+            fill_falls(i, k, 1, 1.0, circuit, state, memory)
             strip[screen.FALL + k] = falls[k]
-            _fall_of_block(i, k, 1, length, circuit, state, memory)
+            fill_falls(i, k, 1, length, circuit, state, memory)
             reference += (falls[k] - fall) * s
             fall = falls[k]
         if circuit.dead_time > 0.0:
@@ -237,7 +221,7 @@ def go_through(lo, count, first, last, starts, circuit, state, memory, buffer, n
             if has_leak:
                 for c in range(f, due):
                     length = starts[c + 1] - starts[c]
-                    _fall_of_block(i, b, size, length, circuit, state, memory)
+                    fill_falls(i, b, size, length, circuit, state, memory)
                     _lower_block(i, b, size, state, memory.falls)
             if due == last:
                 break
@@ -245,8 +229,8 @@ def go_through(lo, count, first, last, starts, circuit, state, memory, buffer, n
             length, end = starts[f] - starts[due], _f(starts[f] - origin)
             m = flag_block(b, size, end, strip, pixels)
             if has_leak:
-                _fall_of_block(i, b, size, length, circuit, state, memory)
-                _lower_unflagged(i, b, size, state, strip, memory.falls)
+                fill_falls(i, b, size, length, circuit, state, memory)
+                lower_references(i, b, size, state, memory)
             interval = Interval(due, origin, starts[due], length)
             j, s = np.int64(0), 0.0
             while j < m:

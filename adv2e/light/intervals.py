@@ -49,7 +49,7 @@ class Part:
     times_ns : list of int
         Start, and end of each interval.
     last : (intervals + 1,) bool
-        See :class:`adv2e.kernel.frames.Schedule`.
+        See :class:`adv2e.kernel.inputs.Schedule`.
     """
 
     frames: NDArray[Any]

@@ -22,9 +22,8 @@ from adv2e.events import EVENT_DTYPE, Events
 from adv2e.kernel import exact
 from adv2e.kernel import packing as order
 from adv2e.kernel.cascade.plan import plan_for
-from adv2e.kernel.circuit import fastest_corner
 from adv2e.kernel.comparator import EventBuffer
-from adv2e.kernel.frames import FrameStack, Schedule, frames_of
+from adv2e.kernel.inputs import FrameStack, Schedule, fastest_corner, frames_of
 from adv2e.kernel.packing import PIXEL_BITS, pack_limit_us
 from adv2e.kernel.photoreceptor.law import noise_of
 from adv2e.kernel.quadrature import rules_for
@@ -147,7 +146,7 @@ class PixelArray:
         """Return the sorted events of the intervals between neighbouring frames of light [DN].
 
         The first frame is the last of the call before; for the printed last interval one more
-        follows, to look ahead.  `last`: see :class:`adv2e.kernel.frames.Schedule`.
+        follows, to look ahead.  `last`: see :class:`adv2e.kernel.inputs.Schedule`.
         """
         before = np.arange(-1, frames.shape[0] - 1)
         part = Part(frames, before, np.ones(before.size, np.float32), times_ns, last)

@@ -21,8 +21,8 @@ from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
 from adv2e.effects.pixel.thresholds import FLOOR
 from adv2e.errors import UsageError
 from adv2e.kernel import per_pixel, rng
-from adv2e.kernel.circuit import Circuit
 from adv2e.kernel.exact import covers
+from adv2e.kernel.inputs import Circuit
 from adv2e.kernel.leak import fill_first_factors, fill_running
 from adv2e.kernel.noise import (
     fill_first_candidates,

@@ -31,8 +31,7 @@ from numpy.typing import NDArray
 from adv2e.effects.composition import COURSES, course, injected, longest_step_us, overrides
 from adv2e.effects.hooks import LONGEST_US, Hooks
 from adv2e.effects.pixel.threshold_drift import drift_factors
-from adv2e.kernel.circuit import EXACT, Circuit, fastest_corner
-from adv2e.kernel.frames import FrameStack
+from adv2e.kernel.inputs import EXACT, Circuit, FrameStack, fastest_corner
 from adv2e.kernel.stepped.driver import BLOCK, Run
 from adv2e.kernel.stepped.events import Injected, injected_of
 from adv2e.light.intervals import Part

@@ -20,7 +20,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-from adv2e.process import signals as unfinished
 from adv2e.process.standard_error import errors_descriptor
 
 
@@ -57,7 +56,7 @@ class _Stop:
         for other in self._caught:
             signal.signal(other, signal.SIG_IGN)  # a second one must not stop the tidying up
         ending = KeyboardInterrupt() if number == signal.SIGINT else Terminated(number)
-        if not unfinished.remove_all():
+        if not remove_all():
             raise ending
         if not self._silent:
             _say_at_once(last_words(ending))

@@ -15,7 +15,7 @@ from adv2e.config import Config
 from adv2e.config.active_effects import active_hooks
 from adv2e.diagnosis.data.evidence import Evidence, check_events
 from adv2e.effects.composition import begin, inside_pixel, longest_step_us
-from adv2e.kernel.circuit import EXACT
+from adv2e.kernel.inputs import EXACT
 from adv2e.light.interpolation.linear import instant_ns
 from adv2e.pixel.state import driver_of, make_circuit
 from adv2e.pixel.steps import Coarseness, steps_of

@@ -213,8 +213,8 @@ def since_burst(period_us: float, begins_us: float) -> Group:
 # ---- Sums over the events of a stream, compiled: they run beside simulations without the lock.
 #
 # Arguments in common: time [us], pixel, polarity and part of each event; `times`, (frames,) [us];
-# `lags`, (lags,) [us]; `slope`, (pixels, frames - 1), all of a pixel side by side, as the lags of an
-# event lie close to one another; `at`, (lags,) zeros, room for where in `times` each lag is.
+# `lags`, (lags,) [us]; `slope`, (pixels, frames - 1), all of a pixel side by side, as the lags of
+# an event lie close to one another; `at`, (lags,) zeros, room for where in `times` each lag is.
 
 
 @kernel

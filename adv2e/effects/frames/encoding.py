@@ -295,7 +295,7 @@ class LightDecoder:
         if not self.colour:
             return self._tables[0].take(image)
         # imported late: checking an encoding needs no compiled code
-        from adv2e.kernel.frame_effects import fill_luma  # noqa: PLC0415
+        from adv2e.kernel.effect_loops import fill_luma  # noqa: PLC0415
 
         light = np.empty(image.shape[:2], np.float32)
         # writable, too: one type for the compiled code

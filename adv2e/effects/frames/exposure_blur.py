@@ -46,7 +46,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.effects.hooks import Frames, Hooks
-from adv2e.kernel.frame_effects import sharpen
+from adv2e.kernel.effect_loops import sharpen
 
 LABELS = {
     "exposure_blur": "exposure of the frames",

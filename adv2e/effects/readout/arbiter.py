@@ -34,7 +34,7 @@ from adv2e.effects.hooks import Hooks, View
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.events import Events, make_events, pixels_of, sort_events
 from adv2e.kernel import rng
-from adv2e.kernel.arbiter import EVENTS, NOBODY, Channel, Requests, serve
+from adv2e.kernel.effect_loops import EVENTS, NOBODY, Channel, Requests, serve
 from adv2e.parameters import Fit, Section, parameter
 
 LABELS = {

@@ -15,7 +15,6 @@ from adv2e.kernel.cascade import screen as cascade
 from adv2e.kernel.cascade import second_look
 from adv2e.kernel.cascade.substep import Piece
 from adv2e.kernel.comparator import with_room
-from adv2e.kernel.lanes import exchange
 from adv2e.kernel.leak import leak_strip, leaks, lower_references
 from adv2e.kernel.photoreceptor import path as noise_path
 from adv2e.kernel.photoreceptor import strip as photoreceptor
@@ -52,8 +51,8 @@ def new_memory() -> CascadeMemory:
 def _begin_pieces(strip, circuit, own):
     """Store log intensity at LIGHT_0, its change up to LIGHT_1, and LIGHT_1 in memory `own`."""
     for k in range(STRIP):
-        x0 = exchange.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
-        x1 = exchange.log_of(np.float64(strip[screen.LIGHT_1 + k]), circuit)
+        x0 = screen.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
+        x1 = screen.log_of(np.float64(strip[screen.LIGHT_1 + k]), circuit)
         own.x[k], own.dx[k] = x0, x1 - x0
         own.light[k] = strip[screen.LIGHT_1 + k]
 
@@ -153,6 +152,6 @@ def advance(lo, count, interval, number, still, circuit, plan, state, memory, bu
             m = screen.flagged(strip, memory.strip.pixels)
             n, buffer = _solve_alone(lo, m, piece, circuit, state, memory, buffer, n)
         if has_leak:
-            lower_references(lo, count, state, memory.strip)
+            lower_references(lo, 0, count, state, memory.strip)
         cascade.step_on(strip, substeps, still)
     return n, buffer

@@ -26,11 +26,10 @@ from adv2e.kernel.cascade.substep import (
     plus,
     value,
 )
-from adv2e.kernel.lanes.exchange import log_of, watch
 from adv2e.kernel.leak import fall_over, leak_rate
 from adv2e.kernel.noise import next_noise
 from adv2e.kernel.photoreceptor import path as noise
-from adv2e.kernel.screen import STRIDE
+from adv2e.kernel.screen import STRIDE, log_of, watch
 
 # ---- The events of one pixel within a substep, with photoreceptor noise: where that may matter.
 
@@ -68,7 +67,7 @@ def fire_in_cells(i, c, place, hull, step, signal, circuit, state, path, buffer,
     :func:`adv2e.kernel.cascade.substep.fire_until`.
     """
     rows, seen, s0, span = path.rows, noise.seen_from(circuit), step.place, step.span
-    samples, levels = path.grid[noise.SAMPLES], path.grid[noise.LEVELS]
+    samples, levels = noise.grid(path)
     cells = samples << levels
     reference, factor = state[per_pixel.REFERENCE, i], leak_factor(i, circuit, state)
     width = 1.0 / (cells * span)  # of a cell, as a part of the substep
@@ -127,8 +126,11 @@ class _Passage(NamedTuple):
 
 
 @kernel
-def _passage(k, piece, circuit, strip):
-    """Return the course of light and the substeps of pixel k in a piece."""
+def _passage(k, length, before, circuit, strip):
+    """Return the course of light and the substeps of pixel k in a piece of `length` us.
+
+    before : time from the interval's start to that of the piece, in lengths of the piece
+    """
     i0, i1 = float(strip[screen.LIGHT_0 + k]), float(strip[screen.LIGHT_1 + k])
     x0 = log_of(i0, circuit)
     dx = log_of(i1, circuit) - x0
@@ -140,12 +142,10 @@ def _passage(k, piece, circuit, strip):
     if not (alone or mixed or brightest > 0.99 * screen.LARGEST_LIGHT):
         rests = i0 == i1 and strip[screen.LAG_0 + k] == 0.0 and strip[cascade.SECOND + k] == 0.0
         return _Passage(x0, dx, rests, False, 1.0, 0.0, 1.0, 1.0)
-    corner = (circuit.dark + circuit.per_dn * brightest) * piece.length
+    corner = (circuit.dark + circuit.per_dn * brightest) * length
     knee = min(max((circuit.knee - x0) / dx, 0.0), 1.0) if mixed and dx != 0.0 else 1.0
     shortest = LONGEST / corner if corner > LONGEST else 1.0
-    return _Passage(
-        x0, dx, False, True, knee, -piece.before, shortest, 1.0 / (FEWEST * max(steep, 1.0))
-    )
+    return _Passage(x0, dx, False, True, knee, -before, shortest, 1.0 / (FEWEST * max(steep, 1.0)))
 
 
 @kernel
@@ -212,7 +212,7 @@ def _solve(k, i, c, s_from, piece, circuit, path, state, strip, buffer, n):
     which to go on.  The rows of the pixel are then those at the end of the piece.
     """
     length, substeps, places, levels = piece.length, piece.substeps, piece.places, piece.levels
-    way = _passage(k, piece, circuit, strip)
+    way = _passage(k, length, piece.before, circuit, strip)
     on_level, off_level = state[per_pixel.ON, i], state[per_pixel.OFF, i]
     on_0, on_rise = on_level * levels[0], on_level * (levels[1] - levels[0])
     off_0, off_rise = off_level * levels[0], off_level * (levels[1] - levels[0])

@@ -182,7 +182,7 @@ def find_places(size, piece, circuit, memory, path, look):
     """
     piece, memory, path, look = borrowed(piece, memory, path, look)
     rows, seen = look.rows, noise.seen_from(circuit)
-    samples, levels = path.grid[noise.SAMPLES], path.grid[noise.LEVELS]
+    samples, levels = noise.grid(path)
     factor = _f(min(piece.levels[0], piece.levels[1]))
     _load(size, memory.pixels, factor, circuit.photo_leak > 0.0, memory.rows, rows)
     _leave_rooms(size, piece, samples, memory, look)

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, special
-from adv2e.kernel.causes import cause_by_most, note_parts
-from adv2e.kernel.comparator import TIE, fire
+from adv2e.kernel.comparator import TIE, cause_by_most, fire, note_parts
 from adv2e.kernel.noise import NONE, noise_within, take_noise
 
 # ---- Distance of one pixel's signal from its reference within a substep, and its first crossing.
@@ -308,6 +307,7 @@ def fire_until(i, t, upto, step, signal, noise, circuit, state, buffer, n):
     """
     h, reference, factor = step.h, state[per_pixel.REFERENCE, i], leak_factor(i, circuit, state)
     on_level, off_level = state[per_pixel.ON, i], state[per_pixel.OFF, i]
+    most = buffer.keys.shape[0]
     signal = plus(signal, noise.c0, noise.c1, noise.c2, noise.c3)
     if state[per_pixel.HOLD, i] >= 0.0:
         t = max(t, (state[per_pixel.HOLD, i] - step.t0) / h)
@@ -318,7 +318,7 @@ def fire_until(i, t, upto, step, signal, noise, circuit, state, buffer, n):
             now, by_noise = reference - factor * fallen(step, t), noise_at(noise, t)
             note_parts(i, now, seen - by_noise, by_noise, 0.0, state)
     while True:
-        if n == buffer.keys.shape[0]:
+        if n == most:
             break
         kind, t_end = noise_within(i, step.t0 + t * h, step.t0 + upto * h, circuit, state)
         end = upto if kind == NONE else max(t, (t_end - step.t0) / h)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.kernel.circuit import Circuit, fastest_corner
+from adv2e.kernel.inputs import Circuit, fastest_corner
 
 SHIFT = 16
 """Bits of a corner in single precision that its entry does not depend on."""

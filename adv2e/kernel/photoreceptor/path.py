@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import kernel
+from adv2e.compiled import inlined, kernel
 from adv2e.kernel import rng
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.photoreceptor import law, strip
@@ -49,16 +49,13 @@ PIXELS, BLOCKS, FROM, SAMPLE = (row * LANES for row in range(4))
 also the lane that it comes from, and the sample that it begins with."""
 
 _NUMBERS = 4 * LANES
-
-
-SAMPLES, LEVELS = 0, 1
-"""Entries of the grid: samples of a piece; between two of them are 2^levels cells."""
+_SAMPLES = 2 * _NUMBERS  # samples of the piece
+_LEVELS = _SAMPLES + 1  # 2^levels cells are between two of them
 
 
 class NoisePath(NamedTuple):
     """Memory for the noise of some pixels."""
 
-    grid: NDArray[np.int64]  # (2,)
     rows: NDArray[np.float32]
     numbers: NDArray[np.int64]
     words: NDArray[np.uint32]  # (4, LANES)
@@ -68,9 +65,15 @@ class NoisePath(NamedTuple):
 def new_path() -> NoisePath:
     """Return fresh memory."""
     return NoisePath(
-        np.zeros(2, np.int64), np.zeros(2 * THERE, np.float32), np.zeros(2 * _NUMBERS, np.int64),
+        np.zeros(2 * THERE, np.float32), np.zeros(_LEVELS + 1, np.int64),
         np.zeros((4, LANES), np.uint32), np.zeros((4, LANES), np.float32),
     )  # fmt: skip
+
+
+@inlined
+def grid(path):
+    """Return the samples of the piece, and the levels: 2^levels cells are between two samples."""
+    return path.numbers[_SAMPLES], path.numbers[_LEVELS]
 
 
 @kernel
@@ -198,7 +201,7 @@ def sample(size, places, piece, samples, levels, circuit, fine, noise, path):
     """
     fine, noise, path = borrowed(fine, noise, path)
     rows, normals, follows = path.rows, path.normals, circuit.follower > 0.0
-    path.grid[SAMPLES], path.grid[LEVELS] = samples, levels
+    path.numbers[_SAMPLES], path.numbers[_LEVELS] = samples, levels
     for c in range(size):
         p = places[c]
         path.numbers[PIXELS + c] = noise.pixels[p]

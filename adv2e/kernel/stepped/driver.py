@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, rng
 from adv2e.kernel.borrowing import borrowed
-from adv2e.kernel.circuit import EXACT
 from adv2e.kernel.comparator import with_room
-from adv2e.kernel.frames import load
+from adv2e.kernel.inputs import EXACT, load
 from adv2e.kernel.leak import leak_over
 from adv2e.kernel.stepped import events, rows, signal
 from adv2e.kernel.stepped.signal import keep_first, limit_slew

@@ -17,9 +17,8 @@ from adv2e.causes import OWN_EFFECT
 from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel
 from adv2e.kernel.borrowing import borrowed
-from adv2e.kernel.causes import cause_by_most, note_parts
-from adv2e.kernel.circuit import EXACT
-from adv2e.kernel.comparator import TIE, fire
+from adv2e.kernel.comparator import TIE, cause_by_most, fire, note_parts
+from adv2e.kernel.inputs import EXACT
 from adv2e.kernel.leak import leak_over
 from adv2e.kernel.noise import NONE, next_noise, noise_within, take_noise
 from adv2e.kernel.stepped import rows
@@ -238,7 +237,7 @@ def fire_step(k, i, step, levels, circuit, injected, state, strip, buffer, n):
     """
     injected, state, strip, buffer = borrowed(injected, state, strip, buffer)
     on0, on1, off0, off1 = levels
-    ta, h = step.start, step.h
+    ta, h, most = step.start, step.h, buffer.keys.shape[0]
     tb = ta + h
     s = strip[rows.FROM + k]
     on_level, off_level = state[per_pixel.ON, i], state[per_pixel.OFF, i]
@@ -261,7 +260,7 @@ def fire_step(k, i, step, levels, circuit, injected, state, strip, buffer, n):
             note_parts(i, now, *_parts(k, s, _at(c0, c1, c2, c3, s), strip), state)
     whole = True
     while True:
-        if n == buffer.keys.shape[0]:
+        if n == most:
             whole = False
             break
         kind, t_end = _due_within(i, ta + s * h, tb, circuit, injected, state)

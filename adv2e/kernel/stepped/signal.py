@@ -22,7 +22,7 @@ import numpy as np
 
 from adv2e.compiled import kernel
 from adv2e.kernel import special
-from adv2e.kernel.circuit import EULER, EXACT, PAPER, ZERO_ORDER_HOLD
+from adv2e.kernel.inputs import EULER, EXACT, PAPER, ZERO_ORDER_HOLD
 from adv2e.kernel.stepped import rows
 
 # ---- The limit on the slew rate, put on a step that the first pole has made without it.
