@@ -8,23 +8,21 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Function = Callable[[Array], Array]
 
-_STEP = 1e-5
-_MOST_STEPS = 60
+_MOST_STEPS = 40
+_ROUGH = 1e-3
+"""Tolerance of fits of which only the best goes on."""
 
 
 def fit(
-    residuals: Callable[[Array], Array],
-    starts: Iterable[Array],
-    lower: Array,
-    upper: Array,
-    tolerance: float = 1e-8,
+    residuals: Function, starts: Sequence[Array], borders: Array, step: float, tolerance: float
 ) -> tuple[Array, float]:
     """Return the best of the fits from several starts, and its sum of squares.
 
@@ -32,53 +30,55 @@ def fit(
     ----------
     residuals : callable
         From the logarithms of the parameters, (p,), to the residuals, (n,); finite.
-    starts : iterable of (p,)
-    lower, upper : (p,)
-        Borders of the logarithms.
+    starts : sequence of (p,)
+    borders : (2, p)
+        Least and largest logarithms.
+    step : float
+        By which logarithms are moved for a derivative.
     tolerance : float
-        A step that lowers the sum of squares by less than this share of it is the last.
+        A step that lowers the sum of squares by less than this share of it is the last.  From each
+        start the fit goes on only as far as tells which is the best.
     """
-    return min(
-        (_descend(residuals, start, lower, upper, tolerance) for start in starts),
-        key=lambda found: found[1],
-    )
+    rough = max(_ROUGH, tolerance) if len(starts) > 1 else tolerance
+    begun = [_descend(residuals, start, borders, step, rough) for start in starts]
+    best = min(begun, key=lambda found: found[1])
+    return best if rough == tolerance else _descend(residuals, best[0], borders, step, tolerance)
 
 
 def _descend(
-    residuals: Callable[[Array], Array], start: Array, lower: Array, upper: Array, tolerance: float
+    residuals: Function, start: Array, borders: Array, step: float, tolerance: float
 ) -> tuple[Array, float]:
-    at = np.clip(start, lower, upper)
+    at = np.clip(start, *borders)
     r = residuals(at)
-    best = float(r @ r)
-    damping = 1e-2
-    slopes = None
-    for _ in range(_MOST_STEPS if at.size else 0):
-        if slopes is None:
-            slopes = _slopes(residuals, at, r, upper)
-        square = slopes.T @ slopes
-        pull = slopes.T @ r
-        scale = np.diag(damping * (np.diag(square) + 1e-9 * (1.0 + np.trace(square))))
-        trial = np.clip(at - np.linalg.solve(square + scale, pull), lower, upper)
-        r_trial = residuals(trial)
-        sum_of_squares = float(r_trial @ r_trial)
-        if sum_of_squares < best:
-            gain = best - sum_of_squares
-            at, r, best, slopes = trial, r_trial, sum_of_squares, None
-            damping = max(damping * 0.2, 1e-9)
-            if gain <= tolerance * (best + 1e-12):
-                break
-        else:
-            damping *= 8.0
-            if damping > 1e8:
-                break
+    best, damping, gain = float(r @ r), 1e-2, np.inf
+    for _ in range(_MOST_STEPS):
+        slopes = slopes_of(residuals, at, r, borders, step)
+        square, pull = slopes.T @ slopes, slopes.T @ r
+        # what would leave its range stays at the border: else the others creep along it
+        free = np.where(pull > 0.0, at > borders[0], at < borders[1]) & (pull != 0.0)
+        square, pull = square[np.ix_(free, free)], pull[free]
+        better = False
+        while free.any() and damping < 1e8 and not better:
+            move = np.zeros(at.size)
+            move[free] = np.linalg.solve(square + np.diag(damping * np.diag(square)), -pull)
+            trial = np.clip(at + move, *borders)
+            r_trial = residuals(trial)
+            gain = best - float(r_trial @ r_trial)
+            better = gain > 0.0
+            damping = max(damping * 0.2, 1e-9) if better else damping * 8.0
+        if not better:
+            break
+        at, r, best = trial, r_trial, best - gain
+        if gain <= tolerance * (best + 1e-12):
+            break
     return at, best
 
 
-def _slopes(residuals: Callable[[Array], Array], at: Array, r: Array, upper: Array) -> Array:
+def slopes_of(residuals: Function, at: Array, r: Array, borders: Array, step: float) -> Array:
+    """Return the derivatives of residuals r, (n,), at a point, (n, p)."""
     slopes = np.empty((r.size, at.size))
     for k in range(at.size):
-        step = -_STEP if at[k] + _STEP > upper[k] else _STEP
         moved = at.copy()
-        moved[k] += step
-        slopes[:, k] = (residuals(moved) - r) / step
+        moved[k] += step if at[k] + step <= borders[1, k] else -step
+        slopes[:, k] = (residuals(moved) - r) / (moved[k] - at[k])
     return slopes

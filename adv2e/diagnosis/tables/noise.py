@@ -115,11 +115,6 @@ class Rates:
         return _typical(self.leak_of, self.weights)
 
     @property
-    def noise_on(self) -> Array:
-        """ON events by noise, of the typical pixel."""
-        return _typical(self.on_of, self.weights)
-
-    @property
     def on(self) -> Array:
         """ON events of the typical pixel."""
         return _typical(self.leak_of + self.on_of, self.weights)

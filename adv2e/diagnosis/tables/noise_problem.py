@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,10 +33,6 @@ LEAST_ERROR = 0.05
 ASSUMED_ERROR = 0.1
 USUAL_FRACTION = 0.01
 """Share of hot pixels where none is declared and only its product with their rate shows."""
-
-Extra = tuple[tuple[str, Any], ...]
-_Several = tuple[str, float, float, tuple[float, ...]]
-"""Key, least and largest value, starts."""
 
 _WORDS = {"rate_hz": "mean", "median_hz": "median"}
 
@@ -91,7 +88,7 @@ class NoiseProblem(Problem):
         rows = np.array([k for _, k in cells])
         white = settings.white or float(data.light.max())
         super().__init__(declared, data.light[rows], data.unit, test[rows], white)
-        self.hot_fraction = declared.held(HOT_FRACTION, USUAL_FRACTION) or USUAL_FRACTION
+        self.hot_fraction = declared.held(HOT_FRACTION) or USUAL_FRACTION
         self._duration, self._pixels = data.duration_s[rows], data.pixels[rows]
         rate = np.array([_rate(data, kind, int(k)) for kind, k in cells])
         watched = data.pixels[rows] * self._duration
@@ -102,7 +99,7 @@ class NoiseProblem(Problem):
         whole = np.where(medians, 1.0 / self._duration, np.nan)  # rate of one event, if known
         self._numbers = [_number_of(kind) for kind in self._kinds]
         shares = np.array([number > 0 for number in self._numbers])
-        self.spread_shows = self.one_by_one = max(self._numbers) > 1
+        self.spread_shows = max(self._numbers) > 1
         self.floor = np.where(shares, 0.0, np.fmax(floor, whole / 3.0))
         self.measured = np.log(rate + self.floor)
         events = np.sqrt((rate + self.floor) / watched)
@@ -122,7 +119,7 @@ class NoiseProblem(Problem):
         self.nuisances = NOTHING
         self.candidates = list(self._candidates(rate))
         known = (LEAK, PHOTO_LEAK, SHOT, MISMATCH)
-        self.neutral = {key: 0.0 for key in known if declared.held(key, None) is None}
+        self.neutral = {key: 0.0 for key in known if declared.written.get(key) is None}
         self.notes = [
             f"255 DN stand for {white:g} {data.unit}.",
             "Errors are of ln(rate + floor), the floor being"
@@ -138,23 +135,23 @@ class NoiseProblem(Problem):
         pixel = self.declared.config.pixel
         noise, corner = pixel.photoreceptor_noise, pixel.low_pass
         sources = NoisySources(
-            leak_hz=self._number(values, LEAK),
-            photo_leak_hz=self._number(values, PHOTO_LEAK),
-            shot_hz=self._number(values, SHOT),
-            rms=self._number(values, RMS),
+            leak_hz=self.declared.value(values, LEAK),
+            photo_leak_hz=self.declared.value(values, PHOTO_LEAK),
+            shot_hz=self.declared.value(values, SHOT),
+            rms=self.declared.value(values, RMS),
             noise_step=0.1 if noise is None else noise.step,
             cutoff_hz=values.get(CUTOFF, 0.0 if corner is None else corner.cutoff_hz),
             dark_cutoff_hz=values.get(
                 DARK_CUTOFF, 0.0 if corner is None else corner.dark_cutoff_hz
             ),
-            follower_hz=self._number(values, FOLLOWER),
+            follower_hz=self.declared.value(values, FOLLOWER),
             on=pixel.thresholds.on,
             off=values.get(OFF, pixel.thresholds.off),
-            mismatch=self._number(values, MISMATCH),
+            mismatch=self.declared.value(values, MISMATCH),
             dead_time_s=0.0 if pixel.refractory is None else 1e-6 * pixel.refractory.period_us,
             hot_fraction=values.get(HOT_FRACTION, self.hot_fraction),
-            hot_hz=self._number(values, HOT_RATE),
-            hot_spread=self._number(values, HOT_SPREAD),
+            hot_hz=self.declared.value(values, HOT_RATE),
+            hot_spread=self.declared.value(values, HOT_SPREAD),
         )
         return noise_rates(sources, light / self.white)
 
@@ -190,26 +187,21 @@ class NoiseProblem(Problem):
             typical, most = float(rate[few].min()), float(rate[few].max())
             typical = max(typical, 1e-2 * most)
 
-        def of_rate(name: str, key: str, factor: float = 1.0, extra: Extra = ()) -> Candidate:
-            parameter = FitParameter(key, 1e-3 * least * factor, 1e3 * most * factor)
-            starts = tuple((factor * start,) for start in (typical, 0.5 * most))
-            return Candidate(name, (parameter,), starts, extra)
+        def of_rate(name: str, key: str, factor: float = 1.0) -> Candidate:
+            ends = 1e-3 * least * factor, 1e3 * most * factor
+            return _several(name, [(key, *ends, (factor * typical, 0.5 * factor * most))])
 
         yield of_rate("leak", LEAK)
         yield of_rate("photo_leak", PHOTO_LEAK)
         yield of_rate("shot_noise", SHOT)
         if not self.spread_shows:
-            fraction = ((HOT_FRACTION, self.hot_fraction),)
-            yield of_rate("hot_pixels", HOT_RATE, 1.0 / self.hot_fraction, extra=fraction)
+            alone = of_rate("hot_pixels", HOT_RATE, 1.0 / self.hot_fraction)
+            yield replace(alone, extra=((HOT_FRACTION, self.hot_fraction),))
         else:
-            yield _several(
-                "hot_pixels",
-                [
-                    (HOT_FRACTION, 1e-3, 0.5, (0.02, 0.1, 0.3)),
-                    (HOT_RATE, 1e-3, 1e3, (1.0, 0.1, 0.02)),
-                    (HOT_SPREAD, 0.05, 2.0, (0.7, 1.0, 1.0)),
-                ],
-            )
+            spread = HOT_SPREAD, 0.05, 2.0, (0.7, 1.0, 1.0)
+            rates = HOT_RATE, 1e-3, 1e3, (1.0, 0.1, 0.02)
+            share = HOT_FRACTION, 1e-3, 0.5, (0.02, 0.1, 0.3)
+            yield _several("hot_pixels", [share, rates, spread])
         thresholds = self.declared.config.pixel.thresholds
         if self.declared.config.pixel.low_pass is None:
             return
@@ -229,8 +221,10 @@ class NoiseProblem(Problem):
             yield _several("photoreceptor_noise", free)
 
 
-def _several(name: str, parameters: Sequence[_Several]) -> Candidate:
-    """Return an effect of several parameters."""
+def _several(
+    name: str, parameters: Sequence[tuple[str, float, float, tuple[float, ...]]]
+) -> Candidate:
+    """Return an effect of keys with their least and largest values, and starts."""
     keys = tuple(FitParameter(key, low, high) for key, low, high, _ in parameters)
     return Candidate(name, keys, tuple(zip(*(starts for *_, starts in parameters), strict=True)))
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config, load_config, names_of, written_keys
-from adv2e.diagnosis.fitting.candidates import Candidate
+from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 
 Array = NDArray[np.float64]
 
@@ -73,18 +73,17 @@ class Declared:
         """Tell whether an effect was declared as absent (null)."""
         return section in self.written and self.written[section] is None
 
-    def held(self, path: str, neutral: float | None) -> float | None:
-        """Return the number written for a key; `neutral` where none is, or its section is off.
+    def held(self, path: str) -> float:
+        """Return the number written for a key; 0, off, where none is or its section is off.
 
         Defaults of this program are no knowledge of a camera, so that a key which is not written
         stands for the effect being absent.
         """
-        value = self.written.get(path)
-        return neutral if value is None else float(value)
+        return float(self.written.get(path) or 0.0)
 
-    def value(self, fitted: Mapping[str, float], path: str, neutral: float | None) -> float | None:
+    def value(self, fitted: Mapping[str, float], path: str) -> float:
         """Return the fitted value of a key, else the declared one; see :meth:`held`."""
-        return fitted[path] if path in fitted else self.held(path, neutral)
+        return fitted[path] if path in fitted else self.held(path)
 
 
 def read_declared(
@@ -128,9 +127,10 @@ class Problem(ABC):
     neutral : mapping of str to float
         Keys that this model has at a value other than the default, where not written.
     notes : list of str
-    one_by_one : bool
-        Whether fits take seconds, so that effects are added to the best set so far, up to four,
-        rather than all sets being tried.
+    step : float
+        By which logarithms of parameters are moved for a derivative.
+    tolerance : float
+        A step of a fit that lowers the sum of squares by less than this share of it is the last.
     """
 
     what: ClassVar[str]
@@ -145,7 +145,8 @@ class Problem(ABC):
     candidates: list[Candidate]
     neutral: dict[str, float]
     notes: list[str]
-    one_by_one: bool = False
+    step: ClassVar[float] = 1e-2
+    tolerance: ClassVar[float] = 1e-6
 
     def __init__(
         self, declared: Declared, light: Array, unit: str, test: NDArray[np.bool_], white: float
@@ -163,9 +164,11 @@ class Problem(ABC):
     def predict(self, values: Mapping[str, float]) -> Array:
         """Return the logarithms that the model with fitted values predicts, (n,), finite."""
 
-    def _number(self, values: Mapping[str, float], key: str) -> float:
-        """Return the fitted or declared value of a key, 0 where there is none."""
-        return self.declared.value(values, key, 0.0) or 0.0
+
+def of_one(name: str, key: str, *starts: float, reach: float = 30.0) -> Candidate:
+    """Return an effect with one key, which reaches by a factor beyond all starts."""
+    parameter = FitParameter(key, min(starts) / reach, max(starts) * reach)
+    return Candidate(name, (parameter,), tuple((start,) for start in starts))
 
 
 def is_key(name: str) -> bool:

@@ -1,21 +1,23 @@
 """Selection of effects for a table: models of increasing size, judged on held-out light levels.
 
 Search and acceptance differ from those for recordings: a table is a handful of rows, too few for
-training, validation and test, and its model is a formula, so that every set of effects is fitted
-with each light level left out in turn.  Candidates, rejections and the result are the same.
+training, validation and test, so that every set of effects is fitted with each light level left out
+in turn.  Candidates, rejections and the result are the same.
 
 The declared model is rejected where its misfit is larger than 95 in 100 of those of tables drawn
-from it.  Only then are effects added: of all sets of one effect, then two, then three, the one
-with the least held-out error, if that is lower than before by more than the best of as many useless
-ones would be by chance, sqrt(2 ln n) standard errors of the difference over the light levels held
-out.  Other sets of that size that fit as well are look-alikes.
+from it.  A model is taken as linear about its point for that, and for intervals, so that no drawn
+table needs a fit of its own.
+
+Only then are effects added, up to three, one after another to the best set so far: the one with the
+least held-out error, if that is lower than before by more than the best of all n sets of that size
+would be by chance if all were useless, sqrt(2 ln n) standard errors of the difference over the
+light levels held out.  Other sets of that size that fit as well are look-alikes.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,13 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.fitting.candidates import Candidate
-from adv2e.diagnosis.tables.fit import fit
+from adv2e.diagnosis.tables.fit import fit, slopes_of
 from adv2e.diagnosis.tables.problem import Array, Problem, Settings
 from adv2e.reports.result import Rejected, Verdict
 
 MOST_EFFECTS = 3
-FEW_DRAWS = 39
-"""Tables drawn where a fit takes seconds."""
 SIGNIFICANT = 0.05
 LOOK_ALIKE = 9.0
 """Difference in the sum of squares, in units of its spread: three standard errors."""
@@ -37,21 +37,26 @@ SKILL = 0.5
 """Least share of the error of a constant that a model must be free of on held-out levels."""
 NEAR = 3.0
 """Held-out error, in floors, up to which a model that fits needs no such share."""
+_OF_FOLDS = 1e-3
+"""Tolerance of fits without a level, which begin where that to all ended."""
 
 
 @dataclass(frozen=True)
 class Draws:
-    """Fits to tables drawn from a fitted model.
+    """Fits to tables drawn from a fitted model, which is taken as linear about its point.
 
     Attributes
     ----------
     logs : (draws, parameters)
         Logarithms of the parameters.
+    predicted : (draws, rows)
+        Logarithms of what is measured.
     p : float
         Share of the tables whose misfit is as large as that of the measured one.
     """
 
     logs: Array
+    predicted: Array
     p: float
 
 
@@ -133,22 +138,17 @@ class Selector:
         log(f"declared model: held-out error {before.error:.3f}, p = {p:.3f}")
         if p >= SIGNIFICANT:
             return Choice(before, before, "consistent", [], [])
-        after = before
+        after = best = before
         tried: list[list[FittedSet]] = []
-        most = MOST_EFFECTS + 1 if self.problem.one_by_one else MOST_EFFECTS
-        base: tuple[Candidate, ...] = ()
-        for size in range(1, min(most, len(candidates)) + 1):
-            sets: Iterable[tuple[Candidate, ...]] = itertools.combinations(candidates, size)
-            if self.problem.one_by_one:
-                sets = [(*base, one) for one in candidates if one not in base]
+        for size in range(1, min(MOST_EFFECTS, len(candidates)) + 1):
+            sets = [(*best.effects, one) for one in candidates if one not in best.effects]
             found = [self.fitted(chosen) for chosen in sets if self._determined(chosen)]
             if not found:
                 break
             tried.append(found)
             best = min(found, key=lambda one: one.error)
-            base = best.effects
             log(f"{size}: {' + '.join(best.names)}, held-out error {best.error:.3f}")
-            if lower(best, after, len(found)):
+            if lower(best, after, math.comb(len(candidates), size)):
                 after = best
                 if self.drawn(after).p >= SIGNIFICANT:
                     break
@@ -194,13 +194,12 @@ class Selector:
         """Fit the declared model with `effects`, to all rows and without each level."""
         joint = Candidate.joined([self.problem.nuisances, *effects])
         starts = [np.array(joint.scaled(start)) for start in joint.starts]
-        point, misfit = self._fit(joint, self._train, starts)
+        point, misfit = self._fit(joint, self._train, starts, self.problem.tolerance)
         errors = np.empty(len(self._units))
         for k, (fold, unit) in enumerate(zip(self._folds, self._units, strict=True)):
             part = point
             if not self.problem.test.any():
-                again = [point] if self.problem.one_by_one else [point, starts[0]]
-                part, _ = self._fit(joint, fold, again)
+                part, _ = self._fit(joint, fold, [point], _OF_FOLDS)
             gap = self.problem.measured - self.predicted(joint, part)
             errors[k] = self._mean_square(gap, unit)
         return FittedSet(effects, joint, point, misfit, errors)
@@ -210,48 +209,43 @@ class Selector:
         return float(np.average(gap[unit] ** 2, weights=self.problem.error[unit] ** -2.0))
 
     def drawn(self, model: FittedSet) -> Draws:
-        """Fit the model to tables drawn from it: normal errors about its logarithms."""
+        """Return fits of the model to tables drawn from it: normal errors about its logarithms."""
         if model.effects not in self._drawn:
             self._drawn[model.effects] = self._draw(model)
         return self._drawn[model.effects]
 
     def _draw(self, model: FittedSet) -> Draws:
-        count = self._settings.draws
-        if self.problem.one_by_one:
-            count = min(count, FEW_DRAWS)
+        problem, train, point = self.problem, self._train, model.point
+        ideal, borders = self.predicted(model.joint, point), _borders(model.joint)
+        slopes = slopes_of(
+            lambda at: self.predicted(model.joint, at), point, ideal, borders, problem.step
+        )
+        weighed = (slopes / problem.error[:, None])[train]
         rng = np.random.default_rng([self._settings.seed, len(model.effects)])
-        ideal = self.predicted(model.joint, model.point)
-        logs = np.empty((count, len(model.point)))
-        above = 0
-        for k in range(count):
-            table = ideal + self.problem.error * rng.standard_normal(ideal.size)
-            logs[k], misfit = self._fit(model.joint, self._train, [model.point], table, 1e-4)
-            above += misfit >= model.misfit
-        return Draws(logs, (above + 1) / (count + 1))
+        drawn = rng.standard_normal((self._settings.draws, int(train.sum())))
+        logs = np.clip(point + drawn @ np.linalg.pinv(weighed).T, *borders)
+        moved = logs - point
+        misfits = np.sum((drawn - moved @ weighed.T) ** 2, axis=1)
+        above = np.count_nonzero(misfits >= model.misfit)
+        return Draws(logs, ideal + moved @ slopes.T, (above + 1) / (len(drawn) + 1))
 
     def predicted(self, joint: Candidate, point: Array) -> Array:
         """Return the logarithms that a model predicts, (rows,)."""
-        keys = (one.key for one in joint.parameters)
-        return self.problem.predict(dict(zip(keys, np.exp(point).tolist(), strict=True)))
+        return self.problem.predict(joint.settings(point))
 
     def _fit(
         self,
         joint: Candidate,
         rows: NDArray[np.bool_],
         starts: Sequence[Array],
-        table: Array | None = None,
-        tolerance: float = 1e-8,
+        tolerance: float,
     ) -> tuple[Array, float]:
-        measured = self.problem.measured if table is None else table
-
         def residuals(logs: Array) -> Array:
-            gap = (measured - self.predicted(joint, logs)) / self.problem.error
+            gap = (self.problem.measured - self.predicted(joint, logs)) / self.problem.error
             chosen: Array = gap[rows]
             return chosen
 
-        low = np.log([one.low for one in joint.parameters])
-        high = np.log([one.high for one in joint.parameters])
-        return fit(residuals, starts, low, high, tolerance)
+        return fit(residuals, starts, _borders(joint), self.problem.step, tolerance)
 
     @cached_property
     def constant(self) -> float:
@@ -264,6 +258,11 @@ class Selector:
                 gap[rows] = measured[rows] - measured[own if own.size else fold].mean()
             errors.append(self._mean_square(gap, unit))
         return float(np.sqrt(np.mean(errors)))
+
+
+def _borders(joint: Candidate) -> Array:
+    """Return the logarithms of the least and the largest parameters, (2, parameters)."""
+    return np.log([[one.low, one.high] for one in joint.parameters]).reshape(-1, 2).T
 
 
 def _rejected(

@@ -72,25 +72,20 @@ class Table:
             line and column are named.
         """
         values = np.full(len(self), np.nan)
+        or_empty = "" if required else ", or empty"
         for k, text in enumerate(self.texts(column) if column in self.columns else []):
-            if not text and required:
-                place = f"{self.name}:{self.lines[k]}"
-                raise DataError(f"{place}: {column}: is empty, must be a number")
-            if not text:
+            if not text and not required:
                 continue
             try:
-                value = self._number(text)
+                values[k] = self._number(text)
             except ValueError:
                 raise self.wrong(k, column, "must be a number") from None
-            if not math.isfinite(value):
-                raise self.wrong(
-                    k, column, "must be a finite number" + ", or empty" * (not required)
-                )
-            if not value > above:
+            if not math.isfinite(values[k]):
+                raise self.wrong(k, column, f"must be a finite number{or_empty}")
+            if not values[k] > above:
                 raise self.wrong(k, column, f"must be above {above:g}")
-            if not value >= at_least:
+            if not values[k] >= at_least:
                 raise self.wrong(k, column, f"must be at least {at_least:g}")
-            values[k] = value
         return values
 
     def _number(self, text: str) -> float:
@@ -99,7 +94,8 @@ class Table:
     def wrong(self, row: int, column: str, text: str) -> DataError:
         """Return the error that says `text` of one cell."""
         cell = self.texts(column)[row]
-        return DataError(f"{self.name}:{self.lines[row]}: {column}: {text}, got {cell!r}")
+        found = f"{text}, got {cell!r}" if cell else f"is empty, {text}"
+        return DataError(f"{self.name}:{self.lines[row]}: {column}: {found}")
 
     def kept(self, keep: Sequence[bool]) -> Table:
         """Return the table of the rows where `keep` is true."""

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from adv2e.cli import main
 from adv2e.config import load_config
 from adv2e.diagnosis.tables.characterise import characterise, problem_of
-from adv2e.diagnosis.tables.latency import first_crossing
+from adv2e.diagnosis.tables.latency import CUTOFF, DARK_CURRENT, FOLLOWER, SLEW
 from adv2e.diagnosis.tables.measurements import measurements_of
 from adv2e.diagnosis.tables.problem import Settings, read_declared
 from adv2e.diagnosis.tables.selection import Selector
@@ -63,32 +63,51 @@ def verdict_of(measured, sets=(), **settings):
     return characterise(measured, read_declared([], sets), Settings(draws=60, **settings))
 
 
+def simulated_us(step, threshold, sets=(), polarity=1, **values):
+    """Latencies that the model predicts, (lights,), with white at the highest one."""
+    columns = {"contrast_ln": np.broadcast_to(step, LIGHT.shape), "polarity": [polarity] * 6}
+    measured = table(np.full(LIGHT.size, 1e4), **columns)
+    problem = problem_of(measured, read_declared([], sets), Settings())
+    keys = {"cutoff": CUTOFF, "follower": FOLLOWER, "slew": SLEW, "stray": DARK_CURRENT}
+    key = f"pixel.thresholds.{'on' if polarity else 'off'}"
+    fitted = {keys[name]: value for name, value in values.items() if value is not None}
+    return np.exp(problem.predict({CUTOFF: CUTOFF_HZ, key: threshold, **fitted}))
+
+
 @pytest.mark.parametrize(
     ("follower_hz", "slew"), [(None, None), (800.0, None), (None, 300.0), (2000.0, 900.0)]
 )
 @pytest.mark.parametrize("threshold", [0.05, 0.2, 0.9])
-def test_first_crossing_is_that_of_the_equations(follower_hz, slew, threshold):
-    w1 = 2 * np.pi * CUTOFF_HZ * LIGHT / LIGHT.max()
-    ours = 1e6 * first_crossing(
-        np.full(LIGHT.shape, STEP),
-        np.full(LIGHT.shape, threshold),
-        w1,
-        None if follower_hz is None else 2 * np.pi * follower_hz,
-        slew,
-    )
+def test_simulated_latency_is_that_of_the_equations(follower_hz, slew, threshold):
+    ours = simulated_us(STEP, threshold, follower=follower_hz, slew=slew)
     theirs = [ode_latency_us(e, follower_hz, slew, threshold=threshold) for e in LIGHT]
-    np.testing.assert_allclose(ours, theirs, rtol=2e-5)
+    np.testing.assert_allclose(ours, theirs, rtol=1e-4, atol=0.03)
+
+
+@pytest.mark.parametrize("polarity", [1, 0], ids=["ON", "OFF"])
+def test_one_pole_fires_after_the_logarithm_of_what_is_left(polarity):
+    """Whatever else the pixel was declared to have: it rests, and is asked for one event."""
+    busy = ["leak.rate_hz=50", "thresholds.mismatch=0.05", "photoreceptor_noise.rms=0.05"]
+    sets = [f"pixel.{key}" for key in busy]
+    ours = simulated_us(STEP, ON, sets=sets, polarity=polarity, stray=2.0)
+    bright = 255.0 * LIGHT / LIGHT.max() + 2.0
+    dim = 255.0 * LIGHT / LIGHT.max() * np.exp(-STEP) + 2.0
+    corner = 2 * np.pi * CUTOFF_HZ * (bright if polarity else dim) / 255.0
+    theirs = -1e6 * np.log(1.0 - ON / np.log(bright / dim)) / corner
+    np.testing.assert_allclose(ours, theirs, rtol=1e-4, atol=0.03)
 
 
 def test_a_threshold_above_the_step_is_never_crossed():
-    time = first_crossing(np.array([0.1, 0.3]), np.array([0.2, 0.2]), np.array([1.0, 1.0]), 2.0)
-    assert np.isinf(time[0])
-    assert np.isfinite(time[1])
+    """Then the latency is as long as is simulated."""
+    found = simulated_us([0.1, *[0.3] * 5], 0.2, follower=2000.0)
+    assert found[0] > 1e5
+    assert found[1:].max() < 3e4
 
 
 def test_two_equal_poles_are_solved():
-    (time,) = first_crossing(np.array([1.0]), np.array([0.5]), np.array([5.0]), 5.0)
-    assert time == pytest.approx(brentq(lambda t: 0.5 - (1 + 5 * t) * np.exp(-5 * t), 0.0, 5.0))
+    found = simulated_us(STEP, 0.5, follower=CUTOFF_HZ)[-1]
+    turns = brentq(lambda t: 0.5 - (1 + t) * np.exp(-t), 0.0, 5.0)
+    assert found == pytest.approx(1e6 * turns / (2 * np.pi * CUTOFF_HZ), rel=1e-3)
 
 
 def test_nothing_missing_is_consistent():
