@@ -152,14 +152,17 @@ def splat(u, v, p, q, score, fraction, best, source):
 
 
 @kernel
-def compose(
-    a, b, ua, va, pa, qa, best_a, source_a, ub, vb, pb, qb, best_b, source_b, fraction, out
-):
+def compose(a, b, from_a, from_b, fraction, out):
     """Fill `out` with the light at `fraction` of the way from `a` to `b`.
+
+    from_a, from_b: motion (u, v) and bend (p, q) of the pixels of each frame, flat, and for each
+    pixel of `out` the score and the index of the one that arrives (:func:`splat`).
 
     Seen in both frames: blended along the motion.  Seen in one only: from that one.  Not known:
     blended in place.  Exactly the light of `a` where nothing moves and `b` is the same.
     """
+    ua, va, pa, qa, best_a, source_a = from_a
+    ub, vb, pb, qb, best_b, source_b = from_b
     rows, columns = a.shape
     rest = 1.0 - fraction
     aside = fraction * rest

@@ -128,7 +128,7 @@ def composed(best_a, best_b, u_a=0.0, u_b=0.0, fraction=0.25, p_a=0.0, p_b=0.0):
     out = zeros((1, 5))
     of_a, of_b = ((u, flat, p, flat) for u, p in ((ua, pa), (ub, pb)))
     best_of_a, best_of_b = bests
-    compose(a, b, *of_a, best_of_a, source, *of_b, best_of_b, source, fraction, out)
+    compose(a, b, (*of_a, best_of_a, source), (*of_b, best_of_b, source), fraction, out)
     return float(out[0, 2])
 
 

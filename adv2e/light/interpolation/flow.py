@@ -185,7 +185,7 @@ def warp(
     first, second = (None, None) if bent is None else bent
     from_a = _arrivals(there, first, fraction)
     from_b = _arrivals(back, second, 1.0 - fraction)
-    compose(a, b, *from_a, *from_b, fraction, out)
+    compose(a, b, from_a, from_b, fraction, out)
     return out
 
 
