@@ -125,9 +125,10 @@ def __getattr__(name: str) -> object:
     from inspect import isfunction  # noqa: PLC0415
 
     from adv2e.in_python import reworded  # noqa: PLC0415
+    from adv2e.options import show_options  # noqa: PLC0415
 
     found = getattr(import_module(_HOMES[name]), name)
-    globals()[name] = found = reworded(found) if isfunction(found) else found
+    globals()[name] = found = show_options(reworded(found)) if isfunction(found) else found
     return found
 
 

@@ -6,8 +6,9 @@ makes Click's options of it.  A function takes the same options by name::
     @takes(InputOptions)
     def open_source(path, **options: Unpack[InputOptions]): ...
 
-:func:`takes` gives it the signature and the documentation that the declarations say, refuses names
-and values that are wrong, and hands it all options, with defaults for those that were left out.
+:func:`takes` refuses names and values that are wrong, and hands it all options, with defaults for
+those that were left out.  :func:`show_options` gives public functions the signature and the
+documentation that the declarations say.
 """
 
 import difflib
@@ -809,9 +810,8 @@ def takes(*groups: Any) -> Callable[[Function], Function]:
     defaults = {name: option.default for name, option in known.items()}
 
     def decorate(function: Function) -> Function:
-        signature = inspect.signature(function)
-        own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
-        named = {one.name for one in own}
+        code = inspect.unwrap(function).__code__
+        named = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
 
         @functools.wraps(function)
         def call(*arguments: Any, **given: Any) -> Any:
@@ -819,30 +819,45 @@ def takes(*groups: Any) -> Callable[[Function], Function]:
                 if name in known:
                     given[name] = known[name].checked(name, value)
                 elif name not in named:
-                    near = difflib.get_close_matches(name, known, 1)
-                    hint = f"; did you mean {near[0]!r}?" if near else ""
-                    raise TypeError(
-                        f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}"
-                    )
+                    raise TypeError(_unknown(function.__name__, name, known))
             given = {**defaults, **given}
             check_together(given)
             return function(*arguments, **given)
 
-        added = [
-            inspect.Parameter(
-                name,
-                inspect.Parameter.KEYWORD_ONLY,
-                default=defaults[name],
-                annotation=_annotation(hint),
-            )
-            for name, hint in _hints(groups).items()
-        ]
         made: Any = call
-        made.__signature__ = signature.replace(parameters=[*own, *added])
-        made.__doc__ = _documented(function.__doc__ or "", groups)
+        made.option_groups = groups
         return made  # type: ignore[no-any-return]
 
     return decorate
+
+
+def _unknown(function: str, name: str, known: Iterable[str]) -> str:
+    """Return the message for an argument that a function does not know."""
+    near = difflib.get_close_matches(name, known, 1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"{function}() got an unexpected keyword argument {name!r}{hint}"
+
+
+def show_options(function: Function) -> Function:
+    """Give a function the signature and the documentation of the options that it takes, if any."""
+    groups = getattr(function, "option_groups", ())
+    if not groups:
+        return function
+    signature = inspect.signature(function)
+    own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
+    added = [
+        inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=hint.__metadata__[0].default,
+            annotation=_annotation(hint),
+        )
+        for name, hint in _hints(groups).items()
+    ]
+    shown: Any = function
+    shown.__signature__ = signature.replace(parameters=[*own, *added])
+    shown.__doc__ = _documented(function.__doc__ or "", groups)
+    return function
 
 
 def _annotation(hint: Any) -> str:

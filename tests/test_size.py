@@ -18,7 +18,7 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1370,
+    "": 1380,
     "batches": 1380,
     "cli": 1400,
     "comparison": 650,
@@ -28,23 +28,23 @@ LIMITS = {
     "diagnosis": 6850,
     "effects": 1590,
     "exporting": 470,
-    "files": 770,
+    "files": 780,
     "formats": 4990,
     "inspection": 260,
     "kernel": 4830,
-    "light": 860,
+    "light": 870,
     "motion": 360,
     "pixel": 570,
     "process": 240,
     "rendering": 740,
     "reports": 1750,
     "representations": 120,
-    "sources": 3620,
+    "sources": 3630,
     "synthetic": 160,
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 311
+FILES = 314
 """Most modules of all packages together."""
 
 _SLACK = 60

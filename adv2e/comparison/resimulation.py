@@ -15,7 +15,7 @@ from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.geometry import Size
-from adv2e.light.pictures import decoder_for
+from adv2e.light.decoding import decoder_for
 from adv2e.light.sensor import Fitting, fitting_of
 from adv2e.sources.frame import Frame
 

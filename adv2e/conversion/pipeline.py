@@ -35,8 +35,9 @@ from adv2e.files.staging import Staging
 from adv2e.formats.registry import check_frames, to_write
 from adv2e.formats.writing import PACKAGES, Sink, open_sink
 from adv2e.geometry import Size
+from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.interpolation import network_of
-from adv2e.light.pictures import decoder_for, drawn, kernel_table, light_text, picture_white
+from adv2e.light.pictures import drawn, picture_white
 from adv2e.light.sensor import fitting_of
 from adv2e.options import SimulatedOutput, takes
 from adv2e.process import bars

@@ -22,8 +22,8 @@ from adv2e.effects.hooks import Frames, Hooks
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.errors import DataError, UsageError, warn
 from adv2e.events import Events, empty_events
+from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.intervals import Intervals
-from adv2e.light.pictures import decoder_for, kernel_table, light_text
 from adv2e.light.sensor import fitting_of
 from adv2e.pixel.array import PixelArray
 from adv2e.pixel.steps import PRECISE, Coarseness

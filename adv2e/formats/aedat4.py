@@ -51,8 +51,8 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError, MissingExtraError
 from adv2e.events import EVENT_DTYPE, Events
+from adv2e.files.backlog import Backlog
 from adv2e.files.regular import expand
-from adv2e.files.workspace import Backlog
 from adv2e.formats.clock import shots_in_order
 from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry
 from adv2e.formats.writing import Request, Writer

@@ -60,9 +60,9 @@ from numpy.typing import NDArray
 
 from adv2e.errors import Adv2eError, DataError, MissingExtraError
 from adv2e.events import EVENT_DTYPE, Events
+from adv2e.files.backlog import Backlog
 from adv2e.files.regular import check_expansion, expand
 from adv2e.files.staging import Staging
-from adv2e.files.workspace import Backlog
 from adv2e.formats.binary import DECODERS
 from adv2e.formats.clock import shots_in_order
 from adv2e.formats.event_file import MOST_COLUMNS, Columns, EventFile, Facts

@@ -44,9 +44,9 @@ from numpy.typing import NDArray
 from adv2e.background import OrderedWork
 from adv2e.errors import DataError
 from adv2e.events import Events
+from adv2e.files.backlog import Backlog
 from adv2e.files.regular import beside
 from adv2e.files.staging import Staging
-from adv2e.files.workspace import Backlog
 from adv2e.files.zips import Members
 from adv2e.formats.event_file import EventFile, Facts
 from adv2e.formats.text import lines_of
@@ -54,7 +54,7 @@ from adv2e.formats.text_writer import text_blocks
 from adv2e.formats.writing import Request, Writer, to_json
 from adv2e.sources.frame import Pixels, Shot
 from adv2e.sources.images.opencv import decode_image
-from adv2e.sources.listed import DESCRIPTION, EVENTS, LIST
+from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST
 from adv2e.sources.times.lists import FrameList, decoded, has_lines, members_of, parse_list
 from adv2e.sources.times.rates import NS_PER_S
 

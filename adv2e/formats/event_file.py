@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from adv2e.formats.clock import unwrapped
 from adv2e.formats.columns import event_unit, named_geometry
 from adv2e.sources.frame import Light, Shot, Track, choose
-from adv2e.sources.listed import recorded_light
+from adv2e.sources.stored import recorded_light
 from adv2e.sources.times.rates import Unit
 from adv2e.ticks import US
 

@@ -17,7 +17,8 @@ from adv2e.formats.registry import format_of, may_hold_events
 from adv2e.options import SourceOptions, takes
 from adv2e.sources import STDIN, open_source
 from adv2e.sources.base import GivenTimes, Selection, Source
-from adv2e.sources.listed import EVENTS, ListedSource, Picture, Timed, timed
+from adv2e.sources.listed import ListedSource, Picture, Timed, timed
+from adv2e.sources.stored import EVENTS
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

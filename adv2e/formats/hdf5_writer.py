@@ -22,7 +22,7 @@ from adv2e.background import OrderedWork
 from adv2e.causes import CAUSED_DTYPE
 from adv2e.errors import OutputError
 from adv2e.events import EVENT_DTYPE, Events
-from adv2e.files.workspace import Backlog
+from adv2e.files.backlog import Backlog
 from adv2e.formats import causes
 from adv2e.formats.hdf5_layouts import DSEC, M3ED, MONASH, MVSEC, V2E, Layout
 from adv2e.formats.writing import Request, Writer, compress, compress_shuffled, to_json

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from adv2e.events import Events, cut
 from adv2e.files.regular import shown
 from adv2e.sources.frame import Frame, Image, Light, Pixels, as_pixels, odd_white
-from adv2e.sources.listed import recorded_light
+from adv2e.sources.stored import recorded_light
 from adv2e.ticks import microseconds
 
 

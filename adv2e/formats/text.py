@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from adv2e.errors import DataError
 from adv2e.formats.columns import geometry_in, order_of
 from adv2e.formats.event_file import Columns, EventFile, Facts
-from adv2e.sources.listed import DESCRIPTION, EVENTS
+from adv2e.sources.stored import DESCRIPTION, EVENTS
 from adv2e.ticks import LARGEST_NS, US, check_time
 
 _BLOCK = 1 << 22  # bytes read at once

@@ -17,11 +17,11 @@ from adv2e.files.regular import check_ends, shown
 from adv2e.files.zips import Members
 from adv2e.formats.reading import Recording, read_events
 from adv2e.formats.registry import may_hold_events
-from adv2e.light.pictures import light_text
+from adv2e.light.decoding import light_text
 from adv2e.options import EventInput, FrameInput, InfoOptions, chosen, declared, takes
 from adv2e.sources import OPENERS, PICTURES, STDIN, Source, open_source
 from adv2e.sources.frame import Light
-from adv2e.sources.listed import EVENTS, LIST
+from adv2e.sources.stored import EVENTS, LIST
 from adv2e.sources.times.rates import seconds
 
 if TYPE_CHECKING:

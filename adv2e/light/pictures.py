@@ -7,19 +7,14 @@ are composed over black.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from adv2e.config.model import Frames, Sampling
-from adv2e.effects.composition import changes_light
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
-from adv2e.effects.hooks import Hooks
-from adv2e.light.sensor import Fitting
-from adv2e.sources.frame import Frame, Light
+from adv2e.sources.frame import Frame
 
 if TYPE_CHECKING:
     from adv2e.light.sensor import Fitting
@@ -88,53 +83,3 @@ def drawn_frame(frame: Frame, encoding: str) -> NDArray[np.uint8]:
     decoder = LightDecoder(encoding, white, dtype, frame.image.ndim == 3)
     picture = picture_of(frame.image, frame.alpha, decoder, eight_bit=True)
     return drawn(picture, picture_white(dtype, white, eight_bit=True))
-
-
-# ---- Decoding of the numbers of frames to light, by encoding and white of a configuration.
-
-
-def encoding_for(frames: Frames, auto: str) -> str:
-    """Return the encoding that a configuration asks for, `auto` being what ``auto`` means."""
-    return auto if frames.encoding == "auto" else frames.encoding
-
-
-def decoder_for(
-    frames: Frames, dtype: DTypeLike, colour: bool, *, auto: str, white: float | None = None
-) -> LightDecoder:
-    """Return the decoder that a configuration asks for.
-
-    `auto` is what ``encoding: auto`` means for the frames, `white` their number for white where
-    that is not the one of the data type.
-    """
-    full_scale = frames.full_scale or white or full_scale_of(dtype)
-    return LightDecoder(encoding_for(frames, auto), full_scale, dtype, colour)
-
-
-def kernel_table(
-    decoder: LightDecoder, sampling: Sampling, hooks: Iterable[Hooks], fitting: Fitting | None
-) -> NDArray[np.float32] | None:
-    """Return the table with which the kernel decodes grey frames itself; None: it takes light.
-
-    A quarter of the memory traffic, but every instant looks its frames up again, and only linear
-    interpolation, of frames as they are, without effects on the light (`hooks`), needs none before.
-    """
-    once = sampling.L == 1 and sampling.interpolation == "linear" and not changes_light(hooks)
-    return decoder.grey_table if once and fitting is None else None
-
-
-def light_text(light: Light, white: float, frames: Frames | None = None) -> str:
-    """Return in one line which light the numbers of frames are taken for, why, and what changes it.
-
-    `white` is the number that means white, unless the configuration says another.
-    """
-    frames = frames or Frames()
-    if frames.encoding != "auto":
-        why = ["as frames.encoding says"]
-    else:
-        why = [light.encoding_reason, "frames.encoding changes it"]
-    if frames.full_scale is not None:
-        why.append("white as frames.full_scale says")
-    elif light.full_scale_reason:
-        why.append(f"white {light.full_scale_reason}")
-    encoding = encoding_for(frames, light.encoding)
-    return f"{encoding}, white {frames.full_scale or white:g} ({'; '.join(why)})"

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from adv2e.causes import without_causes
 from adv2e.events import Events, empty_events
-from adv2e.files.workspace import Backlog
+from adv2e.files.backlog import Backlog
 from adv2e.light.pictures import eight_bit
 from adv2e.rendering.films import NotWritten, PictureOutput
 from adv2e.rendering.styles import Cell, Picture, Style, draw

@@ -18,8 +18,9 @@ from adv2e.errors import DataError
 from adv2e.files.zips import Members
 from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.frame import RECORDED, Light
-from adv2e.sources.listed import DESCRIPTION, EVENTS, LIST, ListedSource, read_light
+from adv2e.sources.listed import ListedSource
 from adv2e.sources.listings import Listing, listed_source
+from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST, read_light
 from adv2e.sources.times.lists import decoded, first_name, member_of
 
 

@@ -15,8 +15,9 @@ from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.frame import Pixels
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, decode_image
 from adv2e.sources.images.source import LISTS, in_order
-from adv2e.sources.listed import LIST, ListedSource, Picture, timed
+from adv2e.sources.listed import ListedSource, Picture, timed
 from adv2e.sources.listings import find_listing, open_listing
+from adv2e.sources.stored import LIST
 from adv2e.sources.times.lists import FrameList, decoded, parse_list
 
 

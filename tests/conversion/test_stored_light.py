@@ -12,7 +12,7 @@ from adv2e.comparison.resimulation import resimulator
 from adv2e.config import load_config
 from adv2e.diagnosis.data.evidence import read_evidence
 from adv2e.formats.reading import read_events
-from adv2e.light.pictures import decoder_for
+from adv2e.light.decoding import decoder_for
 from adv2e.sources import open_source
 
 QUIET = ("--set", "pixel.shot_noise=null", "--set", "pixel.leak=null")

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from adv2e.events import make_events
-from adv2e.files.workspace import Backlog
+from adv2e.files.backlog import Backlog
 
 
 @pytest.mark.parametrize("limit", [0, 500, 1 << 20])

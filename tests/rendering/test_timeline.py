@@ -235,6 +235,6 @@ def test_what_waits_beyond_some_memory_waits_on_disk(monkeypatch, tmp_path):
         return waiting, [(c.caption, int(c.panels[0][0, 0, 0])) for c in album.cells.values()]
 
     _, expected = run()
-    monkeypatch.setattr("adv2e.files.workspace.LIMIT_BYTES", 1000)
+    monkeypatch.setattr("adv2e.files.backlog.LIMIT_BYTES", 1000)
     assert run(folder=tmp_path) == (2, expected)
     assert list(tmp_path.iterdir()) == []

@@ -20,7 +20,7 @@ from adv2e.events import Events
 from adv2e.files.regular import shown
 from adv2e.formats.reading import read_events
 from adv2e.geometry import Rectangle
-from adv2e.light.pictures import decoder_for
+from adv2e.light.decoding import decoder_for
 from adv2e.light.sensor import check_beside
 from adv2e.reports.result import Masked
 

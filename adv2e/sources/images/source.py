@@ -17,7 +17,8 @@ from typing import Any
 from adv2e.errors import DataError
 from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, read_image
-from adv2e.sources.listed import DESCRIPTION, LIST, ListedSource, Picture, light_beside, timed
+from adv2e.sources.listed import ListedSource, Picture, timed
+from adv2e.sources.stored import DESCRIPTION, LIST, light_beside
 from adv2e.sources.times.lists import FrameList, read_list
 
 # ---- Order of pictures by their names: that in which they were most likely taken.
