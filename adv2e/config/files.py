@@ -1,4 +1,4 @@
-"""Finding and reading configuration files; those that are shipped go by their name."""
+"""Configuration files: found, read, written out as YAML; shipped ones go by their name."""
 
 from __future__ import annotations
 

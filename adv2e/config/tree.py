@@ -1,4 +1,4 @@
-"""Trees of values: dotted keys such as ``pixel.leak.rate_hz``, and one tree laid over another."""
+"""Trees of values: dotted keys (``pixel.leak.rate_hz``), merging, and syntax of drawn numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One conversion: source -> light -> events -> sink, with a summary at the end.
+"""One conversion: source -> light -> events -> sink, with a summary and versions at the end.
 
 With more than one thread, frames are read and decoded in a thread ahead of the pixel and events
 written in another behind it; those two are seldom busy and come on top of the threads that compute.

@@ -1,4 +1,4 @@
-"""Regular files: an input must end, which a pipe, a device or a socket may never do.
+"""Input files: regular ones alone, as an input must end; growth of compressed ones; names shown.
 
 Text that people hand over by the shell, ``-c <(...)`` or ``--timestamps /dev/stdin``, comes through
 descriptors that are open already; there somebody writes, and it is read to its end.

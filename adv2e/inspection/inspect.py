@@ -1,4 +1,4 @@
-"""Inspection of one file: its content, problems and notes as one dictionary."""
+"""Inspection of one file: content, problems and notes, of its events among others."""
 
 from __future__ import annotations
 

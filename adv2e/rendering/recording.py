@@ -1,4 +1,4 @@
-"""Pictures and films of a whole recording."""
+"""Films and contact sheets: of a whole recording, or of a stream in bounded memory."""
 
 from __future__ import annotations
 

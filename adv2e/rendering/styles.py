@@ -1,4 +1,4 @@
-r"""Styles: how the events of a window of time become a picture.
+r"""Styles and layout: how the events of a window of time become a picture.
 
 ======== =========================================================================================
 white    a pixel has the colour of its last event, on white; ON red and OFF blue unless told

@@ -1,4 +1,4 @@
-"""Files of a report: ``report.json``, and all of them in place together or not at all."""
+"""Files of a report, ``report.json`` and ``model.yaml`` among them: all in place, or none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""HTML and SVG elements as text that is escaped by construction, and tables of them."""
+"""HTML and SVG elements as escaped text, tables of them, and the words that pages use."""
 
 from __future__ import annotations
 

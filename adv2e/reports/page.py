@@ -1,4 +1,4 @@
-"""``report.html``: everything that was found, in one file that needs no other."""
+"""``report.html``: everything that was found and its looks, in one file that needs no other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sections of the page on the residual of recordings: maps, signatures, what was left out."""
+"""Sections of the page on the residual, on what was left out, and on rejected effects."""
 
 from __future__ import annotations
 

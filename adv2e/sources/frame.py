@@ -1,4 +1,4 @@
-"""A frame, and what the numbers in it stand for."""
+"""A frame, what the numbers in it stand for, and which of several tracks it comes from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verdict on a recording from the end of a search, and its wording."""
+"""Verdict on a recording: error on test data, what would have been seen, and wording."""
 
 from __future__ import annotations
 

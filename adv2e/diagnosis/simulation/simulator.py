@@ -1,4 +1,4 @@
-"""Simulations of the recording's own frames, many at a time, and the progress of a diagnosis."""
+"""Simulations of the recording's own frames, many at a time, frames made once, and progress."""
 
 from __future__ import annotations
 

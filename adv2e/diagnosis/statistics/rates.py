@@ -1,4 +1,4 @@
-"""Event counts: by polarity, speed, brightness, time, event rate and phase between frames."""
+"""Event counts by polarity, speed, brightness, time, rate and phase, and the sums of each."""
 
 from __future__ import annotations
 

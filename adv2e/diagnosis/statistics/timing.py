@@ -1,4 +1,4 @@
-"""Lag of events behind the change of light, its drift over time, and shift in space."""
+"""Times of events: lag behind the light, drift, shift, inter-event times, and stamps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A curve of the recording with the two models around it, as a picture (SVG)."""
+"""Charts (SVG): curves of the recording and both models, errors, and the axes of both."""
 
 from __future__ import annotations
 

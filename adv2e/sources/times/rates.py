@@ -1,4 +1,4 @@
-"""Frame rates and times: as people give them, as decimal numbers, and rates that times have."""
+"""Rates and times of frames: as people give them, as decimals, their unit, and frames missing."""
 
 from __future__ import annotations
 
