@@ -12,16 +12,10 @@ from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.scene import Scene
 from adv2e.diagnosis.data.stream import Stream
-from adv2e.diagnosis.hints.lamps import (
-    Lamp,
-    Service,
-    lamps_of,
-    service_times,
-    strongest_lines,
-    tick_of,
-)
+from adv2e.diagnosis.hints.lamps import Lamp, lamps_of, strongest_lines
 from adv2e.diagnosis.hints.own_period import OwnPeriod
 from adv2e.diagnosis.hints.readouts import Pulse, Readouts, pulse_of, readouts_of
+from adv2e.diagnosis.hints.stamps import Service, service_times, tick_of
 from adv2e.diagnosis.simulation.simulator import Simulator
 
 _LAMP_SEED = 9_998

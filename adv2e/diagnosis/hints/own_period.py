@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.data.stream import Stream
-from adv2e.diagnosis.hints.lamps import tick_of
 from adv2e.diagnosis.hints.readouts import DELAY, RISE, WIDTH, Burst, burst_of, folded
+from adv2e.diagnosis.hints.stamps import tick_of
 
 Array = NDArray[np.float64]
 

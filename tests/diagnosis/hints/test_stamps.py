@@ -10,7 +10,7 @@ from made_up.streams import stream_of
 from adv2e.config import Config
 from adv2e.diagnosis.fitting.library import library
 from adv2e.diagnosis.hints.collect import Hints
-from adv2e.diagnosis.hints.lamps import Service, service_times, tick_of
+from adv2e.diagnosis.hints.stamps import Service, service_times, tick_of
 
 SIDE = 48
 
