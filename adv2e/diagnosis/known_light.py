@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 
 from adv2e.config.model import Sensor
 from adv2e.diagnosis.data.evidence import Evidence, check_events, covered
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.data.stimulus import LEAP_NS, Seen, Stimulus, refined
-from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.tables.table import Table, read_table
 from adv2e.effects.frames.brightness import BRIGHTEST
 from adv2e.errors import DataError

@@ -12,7 +12,7 @@ from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.input_checks import check_inputs, check_known_light
 from adv2e.diagnosis.data.scene import Placed, Scene
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.fitting.candidates import NOTHING, Candidate
 from adv2e.diagnosis.fitting.fitter import (
     TOLERANCE,

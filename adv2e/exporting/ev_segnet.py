@@ -26,7 +26,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.exporting.windows import Slice
+from adv2e.exporting.voxels import Slice
 from adv2e.representations.voxel_grid import event_image
 
 DDD17 = (346, 260)

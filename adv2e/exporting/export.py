@@ -14,7 +14,7 @@ from adv2e import __version__
 from adv2e.errors import UsageError, warn
 from adv2e.exporting import e2vid, ev_segnet, voxels
 from adv2e.exporting.sequence import Sequence, open_sequences
-from adv2e.exporting.windows import (
+from adv2e.exporting.voxels import (
     MOST_EMPTY,
     Slice,
     before_images,

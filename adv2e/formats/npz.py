@@ -36,8 +36,7 @@ from numpy.typing import NDArray
 from adv2e.causes import CAUSED_DTYPE
 from adv2e.errors import DataError
 from adv2e.events import Events
-from adv2e.files.npy import Header, read_array, read_header
-from adv2e.files.zips import open_member, zip_archive
+from adv2e.files.zips import Header, open_member, read_array, read_header, zip_archive
 from adv2e.formats.columns import SIZE_NAMES, find_columns, stated_unit
 from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.formats.writing import Request, Writer, to_json

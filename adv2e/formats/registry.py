@@ -232,7 +232,7 @@ def may_hold_events(path: Path) -> bool:
 
 def _has_fields(path: Path) -> bool:
     """Tell whether a ``.npy`` holds named fields, as stacks of frames do not."""
-    from adv2e.files.npy import read_header  # noqa: PLC0415 - needs NumPy
+    from adv2e.files.zips import read_header  # noqa: PLC0415 - needs NumPy
 
     try:
         with path.open("rb") as file:

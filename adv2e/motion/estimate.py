@@ -163,3 +163,190 @@ def _judged(
 
 def _doubtful(seen: Any, cost: Any, change: Any) -> Any:
     return (seen < _SEEN_LEAST) & (cost > (1.0 - _EXPLAINED_LEAST) * change)
+
+
+# ---- Acceleration along motion paths: the velocity of a pixel changes by the next frame.
+#
+# **Evenly.** With f the motion of a pixel to the next frame and p that to the frame before, r
+# times as far in time, the velocity changes by e = f + p / r from there to here, and the path
+# through all three is, at the share s of the interval to the next,
+#
+# .. math:: x(s) = f s - c\, s (1 - s), \qquad c = \frac{e}{1 + r}
+#
+# so that c is half the acceleration, in pixels per interval squared [1]_. It is taken where the
+# pixel is seen in both frames, and as a mean over the pixels around. The two frames of an interval
+# give one c each. Where they point to opposite sides there is none, else the path bends by the
+# lesser of the two (a limiter, as of slopes in shock-capturing schemes [2]_).
+#
+# **At once.** What is hit within the interval keeps its velocity before until then, and has its
+# velocity behind from then on. The changes at both frames, e and e', then tell when and by how
+# much,
+#
+# .. math:: t = \frac{|e'|}{|e| + |e'|}, \qquad
+#     x(s) = f s - (e + e') \cdot \begin{cases} (1 - t)\, s & s < t \\ t\, (1 - s) & s \ge t
+#     \end{cases}
+#
+# Even acceleration has e = e'; so does a hit in the middle, which four frames cannot tell from it.
+# From t = 0.4 or 0.6 on towards the ends, and jumps of 1.5 pixels an interval on, a path is more
+# and more of this kind.
+#
+# At both ends of a sequence, beside a cut and where intervals differ by more than a factor of 3,
+# paths are straight.
+#
+# References
+# ----------
+# .. [1] X. Xu, L. Siyao, W. Sun, Q. Yin, M.-H. Yang, "Quadratic Video Interpolation", NeurIPS 2019,
+#    arXiv:1911.00627 (the path through three frames).
+# .. [2] P. L. Roe, "Characteristic-Based Schemes for the Euler Equations", Annual Review of Fluid
+#    Mechanics 18, 1986, doi:10.1146/annurev.fl.18.010186.002005 (minmod).
+
+
+_LIKE_SPANS = 3.0
+_AROUND_PX = 2.0
+_KNOWN_LEAST = 0.2
+_UNEVEN = (0.2, 0.5)
+"""Values of |1 - 2 t| up to which a path bends evenly, and from which on at once."""
+_JUMP_PX = (1.5, 3.0)
+"""Jumps of velocity up to which a path bends evenly, and from which on at once [px per interval].
+
+The time of smaller jumps cannot be told from the frames.
+"""
+
+Plane = tuple[Image, Image]
+"""Columns and rows [px] at the pixels of a frame."""
+
+
+@dataclass(frozen=True)
+class Bend:
+    """Deviation of the paths of a frame's pixels from the straight line.
+
+    Attributes
+    ----------
+    even : Plane
+        c [px] of pixels that accelerate evenly.
+    jump : Plane
+        Change of the velocity of pixels that are hit [px per interval].
+    when : (rows, columns) float32
+        Share of the way to the other frame at which a pixel is hit.
+    """
+
+    even: Plane
+    jump: Plane
+    when: Image
+
+    def at(self, share: float) -> Plane:
+        """Return c of the even bend that is as far from the straight line at a share of the way."""
+        early = share < self.when
+        scale = np.where(
+            early, (1 - self.when) / np.float32(1 - share), self.when / np.float32(share)
+        )
+        p, q = (c + j * scale for c, j in zip(self.even, self.jump, strict=True))
+        return p, q
+
+
+@dataclass(frozen=True)
+class Side:
+    """Motion to the frame on the other side of one that ends an interval.
+
+    Attributes
+    ----------
+    motion : Motion
+        From the frame that ends the interval to the one beyond.
+    span : float
+        Time to that frame, in units of the interval.
+    """
+
+    motion: Motion
+    span: float
+
+
+def bends(
+    there: Motion, back: Motion, before: Side | None, after: Side | None
+) -> tuple[Bend, Bend] | None:
+    """Return the bend of the paths of both frames of an interval; None: they are straight.
+
+    `before` and `after` are the sides of the first frame and of the second.
+    """
+    if before is None or after is None or not (_is_like(before.span) and _is_like(after.span)):
+        return None
+    first, second = _change(there, before), _change(back, after)
+    spans = before.span, after.span
+    return _bend(first, second, there, spans), _bend(second, first, back, spans[::-1])
+
+
+def fastest(motion: Motion, bend: Bend | None) -> float:
+    """Return the greatest speed on the paths of a frame's pixels [px per interval].
+
+    Velocity is linear in time but for its jump, so it is greatest at an end of the span before the
+    jump, or of that behind it.  No path is faster; one that bends in both ways may be slower.
+    """
+    if bend is None:
+        return float(np.hypot(motion.u, motion.v).max())
+    most = 0.0
+    for jumped in (bend.when - 1.0, bend.when):
+        for sign in (-1.0, 1.0):
+            ends = (
+                along + sign * even + jumped * jump
+                for along, even, jump in zip(
+                    (motion.u, motion.v), bend.even, bend.jump, strict=True
+                )
+            )
+            most = max(most, float(np.hypot(*ends).max()))
+    return most
+
+
+def _is_like(span: float) -> bool:
+    return 1.0 / _LIKE_SPANS <= span <= _LIKE_SPANS
+
+
+def _change(to: Motion, side: Side) -> Plane:
+    """Return the change of velocity at a frame [px per interval]; 0 where it is not known."""
+    away, span = side.motion, side.span
+    known = ((to.score < ONE_SIDED) & (away.score < ONE_SIDED)).astype(np.float32)
+    weight = _mean(known)
+    told = weight >= _KNOWN_LEAST
+    # what ends the interval at rest, or lies beside it, is not bent, to the last bit
+    still = (to.u == 0.0) & (to.v == 0.0)
+    found = []
+    for there, back in ((to.u, away.u), (to.v, away.v)):
+        change = there + back / np.float32(span)
+        mean = np.where(told, _mean(change * known) / np.maximum(weight, _KNOWN_LEAST), 0.0)
+        found.append(np.where(still, 0.0, mean).astype(np.float32))
+    return found[0], found[1]
+
+
+def _mean(image: NDArray[Any]) -> Image:
+    return cv2.GaussianBlur(image, (0, 0), _AROUND_PX)  # type: ignore[return-value]
+
+
+def _bend(own: Plane, others: Plane, motion: Motion, spans: tuple[float, float]) -> Bend:
+    """Return the bend of the paths of a frame from the changes of velocity at both frames."""
+    rows, columns = motion.u.shape
+    y, x = np.mgrid[:rows, :columns].astype(np.float32)
+    x, y = x + motion.u, y + motion.v
+    other = [
+        cv2.remap(part, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) for part in others
+    ]
+    along = own[0] * other[0] + own[1] * other[1] > 0.0
+    length, limit = np.hypot(*own), np.hypot(*other)
+    both = np.maximum(length + limit, 1e-12)
+    when = limit / both
+    jump = [np.where(along, a + b, 0.0) for a, b in zip(own, other, strict=True)]
+    hit = _between(np.abs(1.0 - 2.0 * when), *_UNEVEN) * _between(np.hypot(*jump), *_JUMP_PX)
+    # c of both frames, of which the lesser counts
+    c, most = length / (1.0 + spans[0]), limit / (1.0 + spans[1])
+    share = np.where(along, np.minimum(c, most) / np.maximum(length, 1e-12), 0.0) * (1.0 - hit)
+    return Bend(
+        _plane(own[0] * share, own[1] * share),
+        _plane(jump[0] * hit, jump[1] * hit),
+        when.astype(np.float32),
+    )
+
+
+def _between(value: NDArray[Any], low: float, high: float) -> NDArray[Any]:
+    """Return 0 up to `low`, 1 from `high` on."""
+    return np.clip((value - low) / (high - low), 0.0, 1.0)
+
+
+def _plane(u: NDArray[Any], v: NDArray[Any]) -> Plane:
+    return u.astype(np.float32), v.astype(np.float32)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from adv2e.reports.charts.pictures import event_picture, top_of
+from adv2e.reports.charts import event_picture, top_of
 from adv2e.reports.markup import Column, Markup, table, tag
 from adv2e.reports.quantities import estimate_text, number_text
 from adv2e.reports.result import Diagnosis, Snapshot, Total

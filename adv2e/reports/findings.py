@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from adv2e.effects import label_of, separated_by
-from adv2e.reports.charts.curve_chart import error_chart
-from adv2e.reports.headline import declared_text
+from adv2e.reports.charts import error_chart
+from adv2e.reports.headline import declared_text, of_each_kind
 from adv2e.reports.markup import (
     OF_TABLES,
     Column,
@@ -34,7 +34,6 @@ from adv2e.reports.quantities import (
     value_text,
 )
 from adv2e.reports.result import Diagnosis, Interval, ListInterval
-from adv2e.reports.standing_out import of_each_kind
 
 _LEAST_P = 0.01
 """Probability from which on chance may make what is left."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from adv2e.reports import findings, residual
-from adv2e.reports.charts.curve_chart import curves
+from adv2e.reports.charts import curves
 from adv2e.reports.events import events
 from adv2e.reports.markup import Markup, tag
 from adv2e.reports.result import Diagnosis

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from adv2e.effects import separated_by
-from adv2e.reports.charts.pictures import CLIP_SD, Map, colour_bar, map_image
+from adv2e.reports.charts import CLIP_SD, Map, colour_bar, map_image
+from adv2e.reports.headline import LARGE_Z, kind_rank, standing_out
 from adv2e.reports.markup import SHOWN, Column, Markup, join, summary_of, table, tag, unit_of
 from adv2e.reports.quantities import (
     NO_UNIT,
@@ -21,7 +22,6 @@ from adv2e.reports.quantities import (
     value_text,
 )
 from adv2e.reports.result import Detectable, Diagnosis, Finding, Rejected, ResidualMap, Signature
-from adv2e.reports.standing_out import LARGE_Z, kind_rank, standing_out
 
 _CHANCE = math.erfc(LARGE_Z / math.sqrt(2.0))
 """Share that a normal deviation has beyond :data:`LARGE_Z`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 
-from adv2e.reports.headline import declared_text
+from adv2e.reports.headline import compared_text, declared_text, of_each_kind
 from adv2e.reports.markup import plain, unit_of
 from adv2e.reports.quantities import (
     interval_text,
@@ -14,7 +14,6 @@ from adv2e.reports.quantities import (
 )
 from adv2e.reports.residual import by_explained
 from adv2e.reports.result import Diagnosis, ErrorRow
-from adv2e.reports.standing_out import compared_text, of_each_kind
 
 WIDTH = 100
 _MOST_PARAMETERS = 5

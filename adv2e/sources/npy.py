@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
-from adv2e.files.npy import Header, read_array, read_header
+from adv2e.files.zips import Header, read_array, read_header
 from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.frame import Pixels, check_pixels
 from adv2e.sources.listed import ListedSource, Picture, Timed, timed

@@ -9,8 +9,7 @@ from adv2e import simulate
 from adv2e.config import load_config
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
-from adv2e.diagnosis.data.splits import Split
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Split, Stream
 from adv2e.diagnosis.prepare import prepare
 from adv2e.diagnosis.simulation.simulator import Simulator
 

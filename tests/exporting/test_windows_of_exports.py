@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from streams import random_events
 
-from adv2e.exporting.windows import before_images, between_images, by_count, by_time
+from adv2e.exporting.voxels import before_images, between_images, by_count, by_time
 
 
 @pytest.fixture(params=[1, 7, 1000, 5000])

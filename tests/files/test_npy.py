@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.files.npy import read_array
+from adv2e.files.zips import read_array
 from adv2e.sources import open_source
 
 

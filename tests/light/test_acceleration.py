@@ -9,8 +9,7 @@ from flow_scenes import FIGURE, GROUND, clouds, disk, pan, pixels
 from adv2e.config.model import Sampling
 from adv2e.light.interpolation import make_upsampler
 from adv2e.light.interpolation.linear import Beside, neighbours
-from adv2e.motion.acceleration import Bend, Side, bends, fastest
-from adv2e.motion.estimate import Motion
+from adv2e.motion.estimate import Bend, Motion, Side, bends, fastest
 
 SHAPE = (40, 48)
 

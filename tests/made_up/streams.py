@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from adv2e.diagnosis.data.scene import Placed, Scene
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.events import EVENT_DTYPE
 
 WIDTH, HEIGHT = 16, 12

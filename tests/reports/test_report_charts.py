@@ -12,21 +12,19 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from made_up_diagnosis import everything, strange
 
-from adv2e.reports.charts.curve_chart import (
+from adv2e.reports.charts import (
     Axis,
     axis_over,
     band_path,
+    colour_bar,
+    colours,
     curve_chart,
     curves,
     drawable,
     error_chart,
     line_path,
-    points_of,
-)
-from adv2e.reports.charts.pictures import (
-    colour_bar,
-    colours,
     map_image,
+    points_of,
 )
 from adv2e.reports.markup import OF_RECORDINGS
 from adv2e.reports.result import Band, Curve, ErrorRow, Estimate

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from adv2e.reports.charts.curve_chart import linear_ticks, log_ticks, tick_labels
+from adv2e.reports.charts import linear_ticks, log_ticks, tick_labels
 
 NUMBERS = st.floats(-1e250, 1e250, allow_subnormal=False)
 POSITIVE = st.floats(1e-250, 1e250)

@@ -6,9 +6,9 @@ from dataclasses import replace
 import pytest
 from made_up_diagnosis import everything
 
+from adv2e.reports.headline import standing_out
 from adv2e.reports.residual import groups
 from adv2e.reports.result import Signature
-from adv2e.reports.standing_out import standing_out
 from adv2e.reports.summary import summary_text
 
 NAN = float("nan")

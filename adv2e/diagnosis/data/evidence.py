@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.config.model import Sensor
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.data.stimulus import Seen, Stimulus, joined
-from adv2e.diagnosis.data.stream import Stream
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
 from adv2e.events import Events

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.data.evidence import Evidence
-from adv2e.diagnosis.data.splits import Split
+from adv2e.diagnosis.data.splits import Split, Stream
 from adv2e.diagnosis.data.stimulus import Leaps
-from adv2e.diagnosis.data.stream import Stream
 from adv2e.reports.quantities import short_text
 
 STILL = 0

@@ -1,4 +1,4 @@
-"""Split of a recording into data for training, validation and test.
+"""Split of a recording into data for training, validation and test, and its events so divided.
 
 Neighbouring pixels and milliseconds are correlated, so the parts are blocks: tiles of pixels
 crossed with segments of time, in the manner of a Latin square, such that every part has all kinds
@@ -8,11 +8,13 @@ of scene.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.events import EVENT_DTYPE, Events
 
 TRAIN, VALIDATION, TEST = 0, 1, 2
 COUNT = 3
@@ -73,3 +75,86 @@ class Split:
             f"the sensor was divided into tiles and the time into {self.segments} segments, shared"
             f" out as: {shares}; the test data were looked at once, at the end"
         )
+
+
+# ---- Events in the form that statistics read, with each event's predecessor.
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Events of a sensor, sorted by time.
+
+    Attributes
+    ----------
+    t : (n,) int64
+        Time [us].
+    pixel : (n,) int32
+        Row times columns plus column.
+    on : (n,) int8
+        1: ON, 0: OFF.
+    width, height : int
+    """
+
+    t: NDArray[np.int64]
+    pixel: NDArray[np.int32]
+    on: NDArray[np.int8]
+    width: int
+    height: int
+
+    @classmethod
+    def of(cls, events: Events, width: int, height: int) -> Stream:
+        """Return sorted `events` as a stream, those of one stamp by pixel.
+
+        In which order a file has these is a habit of who wrote it, and no neighbours in time would
+        be neighbours on the sensor as often as by chance.
+        """
+        pixel = events["y"].astype(np.int32) * width + events["x"]
+        order = np.lexsort((pixel, events["t"]))
+        return cls(
+            events["t"][order], pixel[order], events["p"][order].astype(np.int8), width, height
+        )
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def between(self, start_us: float, stop_us: float) -> Stream:
+        """Return the events of a span of time."""
+        return self.chosen(slice(*np.searchsorted(self.t, [start_us, stop_us])))
+
+    def chosen(self, which: Any) -> Stream:
+        """Return some of the events, chosen by a mask, a slice or indices."""
+        return Stream(self.t[which], self.pixel[which], self.on[which], self.width, self.height)
+
+    def events(self) -> Events:
+        """Return the events in the package's own form."""
+        events = np.empty(len(self), EVENT_DTYPE)
+        events["t"], events["p"] = self.t, self.on
+        events["y"], events["x"] = np.divmod(self.pixel, self.width)
+        return events
+
+    @cached_property
+    def by_pixel(self) -> NDArray[np.int64]:
+        """Order by pixel, and by time in each."""
+        # radix sort for 16-bit numbers
+        small = self.width * self.height <= 1 << 16
+        return np.argsort(self.pixel.astype(np.uint16) if small else self.pixel, kind="stable")
+
+    @cached_property
+    def _before(self) -> NDArray[np.int64]:
+        """Index of the event before each in its pixel; its own where there is none."""
+        order, pixel = self.by_pixel, self.pixel[self.by_pixel]
+        before = np.arange(len(self))
+        same = pixel[1:] == pixel[:-1]
+        before[order[1:][same]] = order[:-1][same]
+        return before
+
+    @cached_property
+    def since(self) -> NDArray[np.int64]:
+        """Time since the event before it in its pixel [us]; -1: there is none."""
+        none = self._before == np.arange(len(self))
+        return np.where(none, -1, self.t - self.t[self._before])
+
+    @cached_property
+    def on_before(self) -> NDArray[np.int8]:
+        """Polarity of the event before it in its pixel; where there is none, its own."""
+        return self.on[self._before]

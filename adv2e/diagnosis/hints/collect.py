@@ -11,7 +11,7 @@ from adv2e.config import Config
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.scene import Scene
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.hints.lamps import Lamp, lamps_of, strongest_lines
 from adv2e.diagnosis.hints.own_period import OwnPeriod
 from adv2e.diagnosis.hints.readouts import Pulse, Readouts, pulse_of, readouts_of

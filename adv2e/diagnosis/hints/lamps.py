@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from adv2e.config import Config
 from adv2e.diagnosis.configurations import with_keys
 from adv2e.diagnosis.data.scene import Scene
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.statistics.spectrum import BIN_US, keeps_time, prominence
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.hints.readouts import DELAY, RISE, WIDTH, Burst, burst_of, folded
 from adv2e.diagnosis.hints.stamps import tick_of
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.configurations import coupling_of, with_keys
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Stream
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from adv2e.config import Config
 from adv2e.diagnosis.configurations import without_coupling
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.scene import Placed
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.fitting.candidates import Candidate, neutral_value
 from adv2e.diagnosis.hints.readouts import DRIFT
 from adv2e.diagnosis.outcome.picture import curves_of, maps_of, snapshot_of, totals_of

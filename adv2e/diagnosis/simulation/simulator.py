@@ -19,7 +19,7 @@ from adv2e.config.user_effects import user_effects
 from adv2e.conversion.simulation import events_from_light
 from adv2e.diagnosis.configurations import coupling_of
 from adv2e.diagnosis.data.evidence import Evidence
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.simulation.affordable import FINE
 from adv2e.effects.frames.misregistration import shifted
 from adv2e.effects.hooks import Hooks

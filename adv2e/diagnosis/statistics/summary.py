@@ -11,7 +11,7 @@ import numpy as np
 from adv2e.config import Config
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.scene import Placed, Scene
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.simulation.simulator import Simulator
 from adv2e.diagnosis.statistics.groups import Array, Entry, Group
 from adv2e.diagnosis.statistics.pixels import count_pixels, pixels

@@ -54,7 +54,7 @@ from numpy.typing import NDArray
 from adv2e.config import Config
 from adv2e.diagnosis.configurations import with_keys, without_coupling
 from adv2e.diagnosis.data.evidence import Evidence
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.simulation.simulator import Simulator
 from adv2e.diagnosis.statistics.metric import compressed, expanded
 from adv2e.diagnosis.statistics.summary import Sampler, SummaryStatistics

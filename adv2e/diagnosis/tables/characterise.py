@@ -9,11 +9,10 @@ from adv2e import __version__
 from adv2e.config import to_dict
 from adv2e.config.tree import set_key
 from adv2e.diagnosis.tables.latency import LatencyProblem
-from adv2e.diagnosis.tables.measurements import Latencies, measurements_of
 from adv2e.diagnosis.tables.noise_problem import NoiseProblem
 from adv2e.diagnosis.tables.problem import Declared, Settings, is_key
 from adv2e.diagnosis.tables.selection import Choice, FittedSet, Selector
-from adv2e.diagnosis.tables.table import Table
+from adv2e.diagnosis.tables.table import Latencies, Table, measurements_of
 from adv2e.errors import DataError
 from adv2e.files.regular import shown
 from adv2e.reports.markup import OF_TABLES
@@ -45,7 +44,7 @@ def characterise(table: Table, declared: Declared, settings: Settings | None = N
     Parameters
     ----------
     table : Table
-        Of latencies or of noise rates (:mod:`adv2e.diagnosis.tables.measurements`).
+        Of latencies or of noise rates (:mod:`adv2e.diagnosis.tables.table`).
     declared : Declared
         Written keys are held; a change of one is a finding.
     settings : Settings, optional

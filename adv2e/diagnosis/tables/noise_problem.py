@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.fitting.candidates import NOTHING, Candidate, FitParameter
-from adv2e.diagnosis.tables.measurements import Noise
 from adv2e.diagnosis.tables.noise import NoisySources, Rates, at_least, noise_rates
 from adv2e.diagnosis.tables.problem import Array, Declared, Problem, Settings, row_errors
+from adv2e.diagnosis.tables.table import Noise
 
 LEAK = "pixel.leak.rate_hz"
 PHOTO_LEAK = "pixel.leak.photo_rate_hz"

@@ -10,7 +10,7 @@ That module puts back what frames tell of changes in time, so it puts back nothi
 exposure is shorter than the frame interval.  This one puts back what frames tell of motion.
 
 Velocity comes from the optical flow to the frames before and after, as the slope of a path through
-all three (adv2e.motion.acceleration).  Where one of the frames does not show the pixel, it comes
+all three (adv2e.motion.estimate).  Where one of the frames does not show the pixel, it comes
 from the other.  Where the two differ by more than half, as when something was hit meanwhile, the
 slower one is taken.  A velocity holds for all pixels over which what moves was smeared, the longest
 smear first.

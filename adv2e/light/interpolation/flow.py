@@ -2,7 +2,7 @@ r"""Interpolation along the motion: edges move from one frame to the next instea
 
 Optical flow is found in both directions (:mod:`adv2e.motion.estimate`).  For the time
 l/L of the interval every pixel of both frames is sent its share of the way [1]_, which bends as the
-frames before and after the interval tell (:mod:`adv2e.motion.acceleration`); where
+frames before and after the interval tell (:mod:`adv2e.motion.estimate`); where
 several arrive, the one whose light agrees best with the other frame is in front.  The light there
 is that of both frames at the ends of this path, blended by l/L; of one frame where the other does
 not see it; and blended in place where no motion is known, as
@@ -38,8 +38,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.light.interpolation.linear import NOTHING, Beside, LinearUpsampler, check_pair, ordered
-from adv2e.motion.acceleration import Bend, Side, bends, fastest
-from adv2e.motion.estimate import Motion, estimate_motion, is_unchanged
+from adv2e.motion.estimate import Bend, Motion, Side, bends, estimate_motion, fastest, is_unchanged
 from adv2e.motion.warping import UNKNOWN, compose, splat
 
 # ---- Paths of the pixels through an interval, and how many frames it needs.

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from made_up.streams import HEIGHT, WIDTH, random_stream, stream_of, streams
 
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.events import EVENT_DTYPE
 
 

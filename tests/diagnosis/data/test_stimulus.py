@@ -6,8 +6,8 @@ import pytest
 from adv2e import simulate
 from adv2e.config import load_config
 from adv2e.diagnosis.configurations import of_frames_again, of_known_light, with_keys
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.data.stimulus import LEAP_NS, Seen, Stimulus, joined, refined
-from adv2e.diagnosis.data.stream import Stream
 from adv2e.diagnosis.known_light import read_known_light, read_stimulus
 from adv2e.diagnosis.simulation.affordable import affordable
 from adv2e.diagnosis.simulation.simulator import Simulator

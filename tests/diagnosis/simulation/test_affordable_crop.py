@@ -9,7 +9,7 @@ from adv2e import simulate
 from adv2e.config import load_config
 from adv2e.diagnosis.data import evidence as evidence_module
 from adv2e.diagnosis.data.evidence import Evidence, RunIn
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.simulation import affordable as affordable_module
 from adv2e.diagnosis.simulation.affordable import affordable
 from adv2e.errors import DataError

@@ -9,7 +9,7 @@ from adv2e.config import load_config
 from adv2e.config.active_effects import active_hooks
 from adv2e.conversion.simulation import events_from_light
 from adv2e.diagnosis.data.evidence import Evidence, RunIn
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.simulation.affordable import FINE, steps_of_time
 from adv2e.effects.hooks import Hooks
 

@@ -8,7 +8,7 @@ from made_up.streams import wandering_light
 from adv2e import load_config
 from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.scene import Scene
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.simulation.simulator import Simulator
 from adv2e.diagnosis.statistics.summary import BOTH, SummaryStatistics
 from adv2e.diagnosis.statistics.uncertainty import (

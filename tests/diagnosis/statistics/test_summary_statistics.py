@@ -22,8 +22,7 @@ from made_up.streams import (
 )
 
 from adv2e.diagnosis.data import splits
-from adv2e.diagnosis.data.splits import Split
-from adv2e.diagnosis.data.stream import Stream
+from adv2e.diagnosis.data.splits import Split, Stream
 from adv2e.diagnosis.hints.lamps import strongest_lines
 from adv2e.diagnosis.statistics import rates, spectrum, timing
 from adv2e.diagnosis.statistics.summary import BOTH, VIEWS, SummaryStatistics

@@ -14,10 +14,9 @@ from adv2e.cli import main
 from adv2e.config import load_config
 from adv2e.diagnosis.tables.characterise import characterise, problem_of
 from adv2e.diagnosis.tables.latency import CUTOFF, DARK_CURRENT, FOLLOWER, SLEW
-from adv2e.diagnosis.tables.measurements import measurements_of
 from adv2e.diagnosis.tables.problem import Settings, read_declared
 from adv2e.diagnosis.tables.selection import Selector
-from adv2e.diagnosis.tables.table import parse_table
+from adv2e.diagnosis.tables.table import measurements_of, parse_table
 from adv2e.errors import DataError
 
 LIGHT = np.array([1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
