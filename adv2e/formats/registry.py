@@ -235,6 +235,7 @@ def _has_fields(path: Path) -> bool:
     from adv2e.files.zips import read_header  # noqa: PLC0415 - needs NumPy
 
     try:
+        check_ends(path)
         with path.open("rb") as file:
             header = read_header(file, path.stat().st_size, str(path))
     except (OSError, DataError):  # for others to tell

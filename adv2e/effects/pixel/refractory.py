@@ -5,7 +5,7 @@ that moment, as the reset switch of the real pixel opens then.  With refractory:
 dead time: the reference moves by the threshold at a signal event and to the signal at a noise
 event.
 
-Compiled in adv2e/kernel/lanes/apply_events.py, adv2e/kernel/cascade/substep.py and
+Compiled in adv2e/kernel/lanes/targets.py, adv2e/kernel/cascade/substep.py and
 adv2e/kernel/stepped/events.py.
 
 References
