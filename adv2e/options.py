@@ -52,6 +52,12 @@ PIXEL_FORMATS = (
 )
 """Raw video that is read, by FFmpeg's names."""
 
+MOST_PICTURES = 36_000
+"""Most pictures of a film."""
+
+MOST_EMPTY = 1000
+"""Most windows in a row without an event."""
+
 SET_BACK = ("continue", "sort")
 """Readings of events whose times go back."""
 
@@ -252,6 +258,16 @@ class FrameInput(AnyFrames, total=False):
     ]
 
 
+StartS = Annotated[
+    "float | None",
+    Option(
+        help="Begin S seconds after the first frame, or event.",
+        flags=("--start",),
+        kind="seconds",
+        metavar="S",
+    ),
+]
+
 StopS = Annotated[
     "float | None",
     Option(
@@ -266,15 +282,7 @@ StopS = Annotated[
 class Part(TypedDict, total=False):
     """Options that choose a part of an input."""
 
-    start_s: Annotated[
-        "float | None",
-        Option(
-            help="Begin S seconds after the first frame, or event.",
-            flags=("--start",),
-            kind="seconds",
-            metavar="S",
-        ),
-    ]
+    start_s: StartS
     stop_s: StopS
     crop: Annotated[
         "str | tuple[int, int, int, int] | None",
@@ -503,7 +511,7 @@ class FilmOptions(TypedDict, total=False):
         int,
         Option(
             help="Most pictures of a film: one wrong time would make far too many.",
-            default=36_000,
+            default=MOST_PICTURES,
             kind="count",
             metavar="N",
         ),
@@ -514,16 +522,7 @@ class FilmOptions(TypedDict, total=False):
 class RenderedPart(FilmOptions, total=False):
     """Options of the film or sheet of a whole recording."""
 
-    start_s: Annotated[
-        float,
-        Option(
-            help="Begin S seconds after the first frame, or event.",
-            default=0.0,
-            flags=("--start",),
-            kind="seconds",
-            metavar="S",
-        ),
-    ]
+    start_s: StartS
     stop_s: StopS
     at_s: Annotated[
         "Sequence[float]",
@@ -596,7 +595,7 @@ class VoxelOptions(TypedDict, total=False):
         Option(
             help="Most windows of TIME in a row without an event: one wrong time would make far too"
             " many.",
-            default=1000,
+            default=MOST_EMPTY,
             flags=("--max-empty",),
             kind="count",
             metavar="N",

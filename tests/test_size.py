@@ -20,7 +20,7 @@ PACKAGE = Path(adv2e.__file__).parent
 LIMITS = {
     "": 1380,
     "batches": 1380,
-    "cli": 1400,
+    "cli": 1390,
     "comparison": 650,
     "compilation": 200,
     "config": 1330,

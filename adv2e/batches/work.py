@@ -197,19 +197,16 @@ class Export:
         Adv2eError
             Something is wrong with the file; then nothing is left.
         """
-        from adv2e.exporting import export  # noqa: PLC0415 - in the process that converts
-        from adv2e.exporting.voxels import VoxelSettings  # noqa: PLC0415
+        from adv2e.exporting.export import export  # noqa: PLC0415 - in the process that converts
 
-        how: dict[str, Any] = {"overwrite": True, "doubt": doubt}
+        how: dict[str, Any] = {"window_us": self.window_us}
         if self.kind == "e2vid":  # which ones are for validation, the lists of the batch say
-            done = export.export_e2vid([events], folder, 0.0, threads, **how)
+            how = {"valid": 0.0}
         elif self.kind == "voxel":
-            cutting = export.Cutting(self.window_us, at_images=self.window_us is None)
-            done = export.export_voxels(
-                [events], folder, cutting, VoxelSettings(bins=self.bins), **how
-            )
-        else:
-            done = export.export_ev_segnet([events], folder, self.window_us or 50_000, **how)
+            how |= {"bins": self.bins, "at": "images" if self.window_us is None else None}
+        done = export(
+            events, folder, self.kind, overwrite=True, threads=threads, doubt=doubt, **how
+        )
         return {**self.described(), "items": done.items, "sha256": digest_of(folder)}
 
 

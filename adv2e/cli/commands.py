@@ -16,7 +16,7 @@ _GROUPS = {
         *("fps", "timestamps", "time_unit", "track", "start", "stop", "start_s", "stop_s", "crop"),
         *("rotate180", "bayer", "pixel_format", "allow_damaged", "take"),
         *("set_back", "crop_events"),
-        *("frames_path", "layout_of_source", "light"),
+        *("frames_path", "light"),
     ),
     "Sensor and pixel": (
         *("config_files", "sets", "seed", "effect_files", "size", "motion", "extent_px"),

@@ -10,7 +10,7 @@ import functools
 import math
 import re
 import sys
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +23,7 @@ from adv2e.cli.exit_status import VERBOSITY
 from adv2e.cli.progress import compilation_told
 from adv2e.files.regular import shown
 from adv2e.geometry import parse_rectangle, parse_size
-from adv2e.options import BAYER, Option, Run, declared
+from adv2e.options import BAYER, Option, OutputOptions, Run, declared
 
 if TYPE_CHECKING:
     from adv2e.config import Config
@@ -251,16 +251,13 @@ _TYPES: dict[str, Any] = {
 """Types of Click by kind of option; the others are text."""
 
 
-def declared_options(
-    *groups: Any, without: Collection[str] = (), help: Mapping[str, str] | None = None
-) -> Callable[[Body], Body]:
+def declared_options(*groups: Any, help: Mapping[str, str] | None = None) -> Callable[[Body], Body]:
     """Return a decorator that adds the options of groups (:mod:`adv2e.options`).
 
     The command gets them as ``given``, a dict by their names in Python.  Those of
-    :func:`reporting_options` and :func:`output_options` are left out, and those `without`; `help`
-    says more of some.
+    :func:`reporting_options` and :func:`output_options` are left out; `help` says more of some.
     """
-    apart = {"progress", "overwrite", *without}
+    apart = ("progress", "overwrite")
     wanted = {name: one for name, one in declared(*groups).items() if name not in apart}
 
     def decorate(body: Body) -> Body:
@@ -305,7 +302,7 @@ def _click_option(name: str, option: Option, help: str = "") -> Callable[[Body],
 
 def output_options(body: Body) -> Body:
     """Add -o and --overwrite; the command gets ``output`` (or None) and ``overwrite``."""
-    body = click.option("--overwrite", is_flag=True, help="Replace an output that exists.")(body)
+    body = _click_option("overwrite", declared(OutputOptions)["overwrite"])(body)
     return click.option(
         "-o",
         "--output",
@@ -363,10 +360,3 @@ def reporting_options(body: Body) -> Body:
             return body(*args, log=log, progress=progress, **kw)
 
     return reporting  # type: ignore[return-value]
-
-
-def run_options(body: Body) -> Body:
-    """Add those of any work: the command gets output, overwrite, threads, progress and log."""
-    for decorator in (reporting_options, threads_option, output_options):
-        body = decorator(body)
-    return body

@@ -15,7 +15,6 @@ from adv2e.errors import UsageError, warn
 from adv2e.exporting import e2vid, ev_segnet, voxels
 from adv2e.exporting.sequence import Sequence, open_sequences
 from adv2e.exporting.voxels import (
-    MOST_EMPTY,
     Slice,
     before_images,
     between_images,
@@ -26,7 +25,7 @@ from adv2e.files.regular import shown
 from adv2e.files.staging import Staging, writing
 from adv2e.formats.reading import events_in_order
 from adv2e.in_python import in_python
-from adv2e.options import EXPORTS, EventInput, ExportOptions, chosen, declared, takes
+from adv2e.options import EXPORTS, MOST_EMPTY, EventInput, ExportOptions, chosen, declared, takes
 
 DESCRIPTION = "export.json"
 """Name of the file that describes an export."""

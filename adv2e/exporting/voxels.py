@@ -24,6 +24,7 @@ import numpy as np
 
 from adv2e.errors import DataError
 from adv2e.events import Events, Window, cut, empty_events
+from adv2e.options import MOST_EMPTY
 from adv2e.representations.voxel_grid import (
     Grid,
     own_window,
@@ -113,10 +114,6 @@ class Slice:
     start_us: int
     stop_us: int
     events: Events
-
-
-MOST_EMPTY = 1000
-"""Windows in a row without an event, unless more are asked for."""
 
 
 def by_time(

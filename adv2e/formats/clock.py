@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
+from adv2e.options import SET_BACK
 from adv2e.sources.times.rates import UNITS
 from adv2e.ticks import US, check_numbers, in_ticks
 
@@ -29,9 +30,7 @@ if TYPE_CHECKING:
 MOST_BACK_US = 100_000
 """Packets out of order, and those of several cameras, are nearer to each other than this [us]."""
 
-CONTINUE, SORT = "continue", "sort"
-SET_BACK = (CONTINUE, SORT)
-"""Choices of the user for timestamps that go back."""
+CONTINUE, SORT = SET_BACK
 
 _WRAPS = ((1 << 32, 0), (1 << 32, -1 << 31), (1 << 31, 0), (1 << 24, 0))
 """Range and lowest number of clocks."""

@@ -60,7 +60,7 @@ def render_recording(
     OutputError, UsageError
         See :func:`open_preview`.
     """
-    start_s, stop_s, at_s = options["start_s"], options["stop_s"], options["at_s"]
+    start_s, stop_s, at_s = options["start_s"] or 0.0, options["stop_s"], options["at_s"]
     most = options["max_pictures"]
     check_distinct(path, recording.inputs)
     has_frames = recording.frame_times_ns is not None and recording.frame_times_ns.size > 0

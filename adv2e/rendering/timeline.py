@@ -18,15 +18,13 @@ from adv2e.causes import without_causes
 from adv2e.events import Events, empty_events
 from adv2e.files.backlog import Backlog
 from adv2e.light.pictures import eight_bit
+from adv2e.options import MOST_PICTURES
 from adv2e.rendering.films import NotWritten, PictureOutput
 from adv2e.rendering.styles import Cell, Picture, Style, draw
 from adv2e.ticks import microseconds
 
 Caption = Callable[[int, int], str]
 """Text of a picture from its time since the start [us] and the number of events it shows."""
-
-MOST_PICTURES = 36_000
-"""Pictures of a film, unless more are asked for: 20 minutes of the usual rate."""
 
 _A_FRAME = 20
 """Pictures that a film may have for each frame in any case."""
