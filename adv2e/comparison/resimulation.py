@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adv2e.config.model import Config
 from adv2e.conversion.simulation import events_from_light
 from adv2e.effects.frames.encoding import LightDecoder
+from adv2e.effects.hooks import Frames
 from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.geometry import Size
@@ -43,9 +42,7 @@ def resimulator(
     return simulate_events
 
 
-def _light(
-    frames: Iterable[Frame], config: Config, encoding: str, size: tuple[int, int]
-) -> Iterator[tuple[int, NDArray[Any]]]:
+def _light(frames: Iterable[Frame], config: Config, encoding: str, size: tuple[int, int]) -> Frames:
     decoder: LightDecoder | None = None
     fitting: Fitting | None = None
     for frame in frames:

@@ -25,10 +25,11 @@ from adv2e.background import OrderedWork
 from adv2e.causes import CAUSES
 from adv2e.config import Config, to_dict
 from adv2e.config.active_effects import active_hooks, user_sources
-from adv2e.conversion.reading import Decoding, Reading, Still
+from adv2e.conversion.reading import Decoded, Decoding, Reading
 from adv2e.conversion.simulation import events_from_light
 from adv2e.effects.frames.brightness import check_white
 from adv2e.effects.frames.encoding import LightDecoder
+from adv2e.effects.hooks import Frames
 from adv2e.events import Events
 from adv2e.files.regular import shown
 from adv2e.files.staging import Staging
@@ -103,16 +104,15 @@ class _Output:
         self.frames = self.first_ns = self.last_ns = 0
         self.events = self.on = 0
 
-    def light_of(self, stills: Iterable[Still]) -> Iterator[tuple[int, NDArray[Any]]]:
-        """Yield (t_ns, light), or grey values, of each frame; what is seen of it is written."""
-        for still in stills:
-            self.first_ns = still.t_ns if not self.frames else self.first_ns
-            self.last_ns = still.t_ns
+    def light_of(self, frames: Iterable[Decoded]) -> Frames:
+        """Yield (t_ns, light), or grey values, of each frame; its picture is written."""
+        for now, picture in frames:
+            self.last_ns = now[0]
+            self.first_ns = self.first_ns if self.frames else self.last_ns
             self.frames += 1
-            if still.picture is not None:
-                self._work.submit(self._write_frame, still.t_ns, still.picture)
-            now = still.t_ns, still.light
-            del still  # with its picture
+            if picture is not None:
+                self._work.submit(self._write_frame, self.last_ns, picture)
+            del picture
             yield now
         if self._preview is not None:
             self._work.submit(self._preview.no_more_frames)
@@ -234,15 +234,15 @@ def convert_reading(
         hooks = active_hooks(config)
         table = kernel_table(decoder, config.sampling, hooks, fitting)
         stated = config.frames.full_scale
-        stills = reading.stills(
+        decoded = reading.decoded(
             Decoding(
                 decoder, table is not None, out.wants_frames, stated, not keeps_all_bits, fitting
             )
         )
         if progress:
-            stills = _shown(stills, recording.count, out, stack)
+            decoded = _shown(decoded, recording.count, out, stack)
         chunks = events_from_light(
-            out.light_of(stills),
+            out.light_of(decoded),
             config,
             hooks=hooks,
             threads=workers,
@@ -375,20 +375,20 @@ def _pieces(events: Events) -> Iterator[Events]:
 
 
 def _shown(
-    stills: Iterator[Still], count: int | None, out: _Output, stack: ExitStack
-) -> Iterator[Still]:
+    frames: Iterator[Decoded], count: int | None, out: _Output, stack: ExitStack
+) -> Iterator[Decoded]:
     """Return the frames, with a bar on stderr that shows how many, and how many events so far.
 
     The bar goes with the `stack`: a line that tells an error does not follow it.
     """
     bar = stack.enter_context(bars.bar(total=count, unit=" frames"))
 
-    def counted() -> Iterator[Still]:
-        for still in stills:
+    def counted() -> Iterator[Decoded]:
+        for frame in frames:
             bar.set_postfix_str(f"{out.events:,} events", refresh=False)
             bar.update()
-            yield still
-            del still  # with its picture
+            yield frame
+            del frame  # with its picture
 
     return counted()
 

@@ -13,7 +13,7 @@ from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from numpy.typing import NDArray
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from adv2e.effects.frames.encoding import LightDecoder
+    from adv2e.effects.hooks import LightFrame
     from adv2e.light.sensor import Fitting
 
 AHEAD_BYTES, AHEAD_FRAMES = 16 << 20, 256
@@ -40,13 +41,8 @@ EARLY_BYTES = 32 << 20
 """Memory for frames that were read before it was known what they are to become."""
 
 
-@dataclass(frozen=True)
-class Still:
-    """A frame: time [ns], light [DN] or grey values, and, where it is kept, what is seen of it."""
-
-    t_ns: int
-    light: NDArray[Any]
-    picture: NDArray[Any] | None
+Decoded: TypeAlias = "tuple[LightFrame, NDArray[Any] | None]"
+"""A frame decoded for the pixels and, where it is kept, its picture."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +71,7 @@ class Decoding:
     eight_bit: bool = False
     fitting: Fitting | None = None
 
-    def still(self, frame: Frame) -> Still:
+    def decoded(self, frame: Frame) -> Decoded:
         """Return a frame decoded for the pixels; DataError if its white is not as configured."""
         check_floats(frame.image, frame.label, self.full_scale)
         if frame.odd_white and self.full_scale is None:
@@ -95,7 +91,7 @@ class Decoding:
             light = self.decoder.over_black(frame.image, frame.alpha)
         if frame.image.dtype.kind == "f":  # here, where its name is known
             check_light(light, frame.label)
-        return Still(frame.t_ns, light, picture)
+        return (frame.t_ns, light), picture
 
 
 class Reading:
@@ -121,7 +117,7 @@ class Reading:
         self.threads = threads or default_threads()
         self._opened: Source | Adv2eError | None = None
         self._decoding: Future[Decoding] = Future()
-        self._stills: Iterator[Still] = iter(())
+        self._decoded: Iterator[Decoded] = iter(())
         self._at_end = ExitStack()
 
     @property
@@ -153,10 +149,10 @@ class Reading:
         """Return a context within which Ctrl-C ends a pipe's frames, as `told`; see `Source`."""
         return self.source.capturing(told) if self.is_open else nullcontext()
 
-    def stills(self, decoding: Decoding) -> Iterator[Still]:
+    def decoded(self, decoding: Decoding) -> Iterator[Decoded]:
         """Return the frames, as `decoding` says; raises what goes wrong with them."""
         self._decoding.set_result(decoding)
-        return self._stills
+        return self._decoded
 
     def __enter__(self) -> Reading:
         try:
@@ -165,11 +161,11 @@ class Reading:
             self._opened = error
             return self
         source.threads = self.threads
-        self._stills = _stills(source.frames(), self._decoding)
+        self._decoded = _decoded(source.frames(), self._decoding)
         if self.threads > 1 and not source.waits:
             count = AHEAD_BYTES // (8 * source.width * source.height)
-            self._stills = self._at_end.enter_context(
-                read_ahead(self._stills, min(max(1, count), AHEAD_FRAMES))
+            self._decoded = self._at_end.enter_context(
+                read_ahead(self._decoded, min(max(1, count), AHEAD_FRAMES))
             )
             self._at_end.callback(self._decoding.cancel)  # its thread may wait for it
         return self
@@ -183,7 +179,7 @@ class Reading:
         self._at_end.__exit__(kind, error, trace)
 
 
-def _stills(frames: Iterator[Frame], decoding: Future[Decoding]) -> Generator[Still, None, None]:
+def _decoded(frames: Iterator[Frame], decoding: Future[Decoding]) -> Generator[Decoded, None, None]:
     """Yield the frames once it is known what they are to become, some of them read before."""
     waiting: deque[Frame] = deque()
     room = EARLY_BYTES
@@ -200,11 +196,11 @@ def _stills(frames: Iterator[Frame], decoding: Future[Decoding]) -> Generator[St
         wrong = error
     known = decoding.result()
     while waiting:
-        yield known.still(waiting.popleft())
+        yield known.decoded(waiting.popleft())
     if wrong is not None:
         raise wrong
     for frame in frames:
-        still = known.still(frame)
+        seen = known.decoded(frame)
         del frame
-        yield still
-        del still
+        yield seen
+        del seen

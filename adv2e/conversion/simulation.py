@@ -18,7 +18,7 @@ from adv2e.config.active_effects import active_hooks
 from adv2e.effects.composition import begin, check_causes, map_events, overrides
 from adv2e.effects.frames.brightness import bounded, check_floats
 from adv2e.effects.frames.encoding import LightDecoder
-from adv2e.effects.hooks import Frames, Hooks
+from adv2e.effects.hooks import Frames, Hooks, LightFrame
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.errors import DataError, UsageError, warn
 from adv2e.events import Events, empty_events
@@ -28,7 +28,7 @@ from adv2e.light.sensor import fitting_of
 from adv2e.pixel.array import PixelArray
 from adv2e.pixel.steps import PRECISE, Coarseness
 from adv2e.process import bars
-from adv2e.sources.frame import Pixels, check_values, light_of_images
+from adv2e.sources.frame import Frame, check_values, light_of_images
 from adv2e.sources.times.rates import NS_PER_S, FrameRate, Rate, parse_rate
 from adv2e.ticks import check_time
 
@@ -171,9 +171,7 @@ def _filled(chunks: Iterator[Events]) -> Iterator[Events]:
         yield nothing
 
 
-def _shown(
-    light: Iterable[tuple[int, NDArray[Any]]], count: int | None
-) -> Iterator[tuple[int, NDArray[Any]]]:
+def _shown(light: Iterable[LightFrame], count: int | None) -> Frames:
     """Yield the frames, with a progress bar on stderr."""
     with bars.bar(total=count, unit=" frames") as bar:
         for frame in light:
@@ -213,7 +211,7 @@ def _checked(
     full_scale: float | None,
     *,
     has_rate: bool,
-) -> Iterator[tuple[int, NDArray[Any]]]:
+) -> Frames:
     """Yield time [ns] and numbers of each frame; with a rate, there are always more times."""
     coming = iter(times)
     first: NDArray[Any] | None = None
@@ -249,7 +247,7 @@ def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
         raise DataError(
             f"frame 0: shape {image.shape}, must be (rows, columns) or (rows, columns, 3)"
         )
-    light = light_of_images(Pixels(image), "arrays")
+    light = light_of_images(Frame(image), "arrays")
     decoder = decoder_for(config.frames, image.dtype, colour, auto=light.encoding)
     if config.frames.encoding == "auto" and light.is_guess:
         taken = light_text(light, decoder.full_scale, config.frames)
@@ -258,7 +256,7 @@ def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
 
 
 def events_from_light(
-    light: Iterable[tuple[int, NDArray[Any]]],
+    light: Iterable[LightFrame],
     config: Config,
     *,
     hooks: Sequence[Hooks] | None = None,

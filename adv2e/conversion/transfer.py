@@ -34,7 +34,7 @@ from adv2e.light.pictures import picture_of, picture_white
 from adv2e.options import CopyOptions, EventInput, chosen, crop_of, takes
 from adv2e.process import bars
 from adv2e.sources.base import Selection
-from adv2e.sources.frame import Light, Pixels
+from adv2e.sources.frame import Frame, Light
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -212,15 +212,15 @@ def _write_frames(file: EventFile, part: _Part, sink: Sink, keeps_all_bits: bool
     return count
 
 
-def stored_picture(pixels: Pixels, light: Light, keeps_all_bits: bool) -> NDArray[Any]:
+def stored_picture(frame: Frame, light: Light, keeps_all_bits: bool) -> NDArray[Any]:
     """Return a frame of an event file in the whole numbers that are stored."""
-    image, white = pixels.image, _white(pixels, light)
+    image, white = frame.image, _white(frame, light)
     decoder = LightDecoder(light.encoding, white, image.dtype, image.ndim == 3)
-    return picture_of(image, pixels.alpha, decoder, not keeps_all_bits)
+    return picture_of(image, frame.alpha, decoder, not keeps_all_bits)
 
 
-def _white(pixels: Pixels, light: Light) -> float:
-    return light.full_scale or pixels.white or full_scale_of(pixels.image.dtype)
+def _white(frame: Frame, light: Light) -> float:
+    return light.full_scale or frame.white or full_scale_of(frame.image.dtype)
 
 
 def copied_metadata(

@@ -40,8 +40,11 @@ from adv2e.parameters import Section
 Times = NDArray[np.float64]
 """(n,) times [s] on the camera's clock, increasing."""
 
-Frames = Iterator[tuple[int, NDArray[Any]]]
-"""Pairs of time [ns] and light [DN] (rows, columns), float32 or float64."""
+LightFrame = tuple[int, NDArray[Any]]
+"""Time [ns] and light [DN] (rows, columns) of a frame, float32 or float64."""
+
+Frames = Iterator[LightFrame]
+"""Frames of a recording as the pixel sees them, in the order of time."""
 
 LONGEST_US = 100.0
 """Longest step in which the circuit is solved, and courses are followed unless they say more."""

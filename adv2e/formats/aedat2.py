@@ -52,7 +52,7 @@ from adv2e.formats.binary import Numbers, blocks
 from adv2e.formats.clock import CONTINUE, Clock
 from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.formats.writing import Request, Writer, to_line
-from adv2e.sources.frame import Pixels, Shot
+from adv2e.sources.frame import Frame, Shot
 
 _CHIPS = {
     "dvs128": (128, 128),
@@ -257,7 +257,7 @@ def _frames(path: Path, begin: int, size: tuple[int, int], facts: Facts) -> list
     ]
 
 
-def _load(path: Path, begin: int, frame: _Frame, size: tuple[int, int]) -> Pixels:
+def _load(path: Path, begin: int, frame: _Frame, size: tuple[int, int]) -> Frame:
     """Return the image of a frame."""
     width, height = size
     read = np.full((2, height, width), -1, np.int32)
@@ -275,7 +275,7 @@ def _load(path: Path, begin: int, frame: _Frame, size: tuple[int, int]) -> Pixel
             break
     if (read < 0).any():
         raise DataError(f"{path}: a frame holds some pixels twice, and others not at all")
-    return Pixels((read[0] - read[1]).clip(0, _WHITE).astype(np.uint16), white=float(_WHITE))
+    return Frame((read[0] - read[1]).clip(0, _WHITE).astype(np.uint16), white=float(_WHITE))
 
 
 class Aedat2Writer(Writer):

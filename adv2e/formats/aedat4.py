@@ -57,7 +57,7 @@ from adv2e.formats.clock import shots_in_order
 from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry
 from adv2e.formats.writing import Request, Writer
 from adv2e.light.pictures import eight_bit
-from adv2e.sources.frame import Pixels, Shot, Track, counted
+from adv2e.sources.frame import Frame, Shot, Track, counted
 from adv2e.ticks import US, check_time, check_us
 
 MAGIC = b"#!AER-DAT4.0\r\n"
@@ -389,7 +389,7 @@ def _frame(head: _Head, label: str, data: bytes) -> Table:
     return Table(unpacked(data, head.compression, label), _FRAME.encode(), label)
 
 
-def _load(path: Path, head: _Head, begin: int, label: str, size: int) -> Pixels:
+def _load(path: Path, head: _Head, begin: int, label: str, size: int) -> Frame:
     with path.open("rb") as file:
         file.seek(begin + 8)
         frame = _frame(head, label, file.read(size))
@@ -402,7 +402,7 @@ def _load(path: Path, head: _Head, begin: int, label: str, size: int) -> Pixels:
     if min(width, height) < 1 or nbytes != pixels.size:
         raise DataError(f"{label}: a frame of {width}x{height} in {pixels.size:,} bytes: damaged")
     image = pixels.view(dtype).reshape(height, width, channels)
-    return Pixels(np.ascontiguousarray(image[..., 0] if channels == 1 else image[..., 2::-1]))
+    return Frame(np.ascontiguousarray(image[..., 0] if channels == 1 else image[..., 2::-1]))
 
 
 _PACKET = 10_000  # events

@@ -69,7 +69,7 @@ from adv2e.formats.event_file import MOST_COLUMNS, Columns, EventFile, Facts
 from adv2e.formats.writing import Request, Writer, to_json
 from adv2e.light.pictures import eight_bit
 from adv2e.process.machine import machine_complaint
-from adv2e.sources.frame import Pixels, Shot, Track, counted
+from adv2e.sources.frame import Frame, Shot, Track, counted
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.times.rates import NS_PER_S
 from adv2e.ticks import check_time, check_us
@@ -269,7 +269,7 @@ def _of_mono(words: NDArray[np.uint64], stamp_ns: int) -> Columns:
     return t, x, y, (words >> np.uint64(63)).astype(np.uint8)
 
 
-def read_image(data: bytes, is_cdr: bool, label: str) -> Pixels:
+def read_image(data: bytes, is_cdr: bool, label: str) -> Frame:
     """Return the picture of a sensor_msgs/Image; DataError if that cannot be read."""
     cursor = _Cursor(data, is_cdr, label)
     cursor.stamp_ns()
@@ -291,10 +291,10 @@ def read_image(data: bytes, is_cdr: bool, label: str) -> Pixels:
         )
     rows = np.frombuffer(content, np.uint8).reshape(height, step)[:, :row]
     image = np.ascontiguousarray(rows).view(dtype).reshape(height, width, channels)
-    return Pixels(np.ascontiguousarray(image[..., chosen]).astype(kind))
+    return Frame(np.ascontiguousarray(image[..., chosen]).astype(kind))
 
 
-def read_compressed(data: bytes, is_cdr: bool, label: str) -> Pixels:
+def read_compressed(data: bytes, is_cdr: bool, label: str) -> Frame:
     """Return the picture of a sensor_msgs/CompressedImage; DataError if that cannot be read."""
     cursor = _Cursor(data, is_cdr, label)
     cursor.stamp_ns()
@@ -365,7 +365,7 @@ def open_bag(path: Path, facts: Facts) -> EventFile:
     if first is not None:
         facts.state(_size(first.size), "its first message of events")
     elif bag.images is not None and bag.images.count:
-        height, width = bag.pixels(0, f"{path}: the first image").image.shape[:2]
+        height, width = bag.frame(0, f"{path}: the first image").image.shape[:2]
         facts.state((width, height), "its first image")
 
     def parts() -> Iterator[Columns]:
@@ -396,7 +396,7 @@ def _joined(held: list[Columns]) -> Columns:
 
 def _shots(bag: _Bag, facts: Facts) -> Iterator[Shot]:
     shots = [
-        Shot(t_ns, label, partial(bag.pixels, number, label))
+        Shot(t_ns, label, partial(bag.frame, number, label))
         for number, (t_ns, label) in enumerate(bag.stamps())
     ]
     name = bag.images.name if bag.images is not None else ""
@@ -503,7 +503,7 @@ class _Bag:
             check_time(t_ns, label)
             yield t_ns, label
 
-    def pixels(self, number: int, label: str) -> Pixels:
+    def frame(self, number: int, label: str) -> Frame:
         """Load an image; faster if those before it were loaded last."""
         assert self.images is not None
         if number != self._next:

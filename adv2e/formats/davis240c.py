@@ -52,7 +52,7 @@ from adv2e.formats.event_file import EventFile, Facts
 from adv2e.formats.text import lines_of
 from adv2e.formats.text_writer import text_blocks
 from adv2e.formats.writing import Request, Writer, to_json
-from adv2e.sources.frame import Pixels, Shot
+from adv2e.sources.frame import Frame, Shot
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST
 from adv2e.sources.times.lists import FrameList, decoded, has_lines, members_of, parse_list
@@ -110,7 +110,7 @@ def open_davis240c(path: Path, facts: Facts) -> EventFile:
     return replace(text_file, layout="davis240c", shots=lambda: iter(shots))
 
 
-def _image(files: Members, name: str) -> Pixels:
+def _image(files: Members, name: str) -> Frame:
     return decode_image(files.read(name), files.label(name))
 
 

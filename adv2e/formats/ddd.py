@@ -53,7 +53,7 @@ from adv2e.formats import hdf5
 from adv2e.formats.clock import CONTINUE, Clock
 from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.formats.hdf5_layouts import Layout
-from adv2e.sources.frame import Pixels, Shot
+from adv2e.sources.frame import Frame, Shot
 from adv2e.ticks import S
 
 _SPECIAL, _POLARITY, _FRAME = range(3)
@@ -179,7 +179,7 @@ def _frames(path: Path, facts: Facts) -> Generator[Shot, None, None]:
                     yield Shot(t_us * 1000, label, partial(_load, path, packet.row, number))
 
 
-def _load(path: Path, row: int, number: int) -> Pixels:
+def _load(path: Path, row: int, number: int) -> Frame:
     label = f"{path}: dvs/data row {row}"
     with hdf5.opened(path) as file:
         (packet,) = _packets_of(_data(file), row, row + 1, str(path))
@@ -193,7 +193,7 @@ def _load(path: Path, row: int, number: int) -> Pixels:
         raise DataError(
             f"{label}: a frame of {columns}x{rows} pixels in {item.size - _FRAME_HEAD} bytes"
         )
-    return Pixels(item[_FRAME_HEAD:end].view("<u2").astype(np.uint16).reshape(rows, columns))
+    return Frame(item[_FRAME_HEAD:end].view("<u2").astype(np.uint16).reshape(rows, columns))
 
 
 def _packets(path: Path, facts: Facts) -> Iterator[_Packet]:

@@ -21,7 +21,7 @@ from adv2e.errors import DataError
 from adv2e.formats import hdf5
 from adv2e.formats.clock import unwrapped
 from adv2e.formats.event_file import Columns, EventFile, Facts
-from adv2e.sources.frame import Pixels, Shot
+from adv2e.sources.frame import Frame, Shot
 from adv2e.sources.times.rates import Unit, frame_unit
 from adv2e.ticks import NS, US, S, to_ticks
 
@@ -246,11 +246,11 @@ class Layout:
             )
         return stack if stack.shape[0] else None
 
-    def _frame(self, path: Path, number: int) -> Pixels:
+    def _frame(self, path: Path, number: int) -> Frame:
         with hdf5.opened(path) as file:
             stack = self._stack(file)
             assert stack is not None
-            return Pixels(np.ascontiguousarray(stack[number]))
+            return Frame(np.ascontiguousarray(stack[number]))
 
 
 def _whole(values: NDArray[Any], label: str) -> NDArray[Any]:
@@ -322,14 +322,14 @@ def _shape(path: Path, image: h5py.Dataset) -> tuple[int, ...]:
     return shape
 
 
-def _image(path: Path, name: str) -> Pixels:
+def _image(path: Path, name: str) -> Frame:
     with hdf5.opened(path) as file:
         found = hdf5.dataset(file, name)
         shape = _shape(path, found)
         image = hdf5.read_all(found, f"{path}: {name}")
     if len(shape) == 3:
         image = image[..., 0] if shape[2] == 1 else image[..., ::-1]
-    return Pixels(np.ascontiguousarray(image))
+    return Frame(np.ascontiguousarray(image))
 
 
 MONASH = Layout(

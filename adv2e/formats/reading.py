@@ -39,7 +39,7 @@ from adv2e.formats.registry import format_of
 from adv2e.geometry import MOST_PIXELS
 from adv2e.options import EventInput, size_of, takes
 from adv2e.process.machine import machine_complaint
-from adv2e.sources.frame import Pixels, Shot, Track, rotated180
+from adv2e.sources.frame import Frame, Shot, Track, rotated180
 from adv2e.sources.times.rates import SETTLED, seconds
 from adv2e.ticks import check_us
 
@@ -155,10 +155,10 @@ def _shots(facts: Facts, shots: Callable[[], Iterator[Shot]]) -> Iterator[Shot]:
             yield replace(shot, load=partial(_loaded, facts, shot.load))
 
 
-def _loaded(facts: Facts, load: Callable[[], Pixels]) -> Pixels:
+def _loaded(facts: Facts, load: Callable[[], Frame]) -> Frame:
     with _reading(facts.path):
-        pixels = load()
-    return rotated180(pixels) if facts.rotate180 else pixels
+        frame = load()
+    return rotated180(frame) if facts.rotate180 else frame
 
 
 @contextmanager

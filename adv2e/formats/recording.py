@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from adv2e.events import Events, cut
 from adv2e.files.regular import shown
-from adv2e.sources.frame import Frame, Image, Light, Pixels, as_pixels, odd_white
+from adv2e.sources.frame import Frame, Image, Light, odd_white
 from adv2e.sources.stored import recorded_light
 from adv2e.ticks import microseconds
 
@@ -65,7 +65,7 @@ class Recording:
     frame_times_ns: NDArray[np.int64] | None = None
     metadata: dict[str, Any] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
-    images: Callable[[], Iterator[Image | Pixels]] = field(default=lambda: iter(()), repr=False)
+    images: Callable[[], Iterator[Image | Frame]] = field(default=lambda: iter(()), repr=False)
     inputs: list[str | Path] = field(default_factory=list, repr=False)
 
     def __len__(self) -> int:
@@ -184,14 +184,14 @@ class Recording:
         stored = self.light.full_scale
         first: float | None = None
         for number, (t_ns, image) in enumerate(zip(times, self.images(), strict=True)):
-            pixels = as_pixels(image)
-            first = pixels.white if number == 0 else first
-            odd = "" if stored is not None else odd_white(pixels, first)
+            frame = image if isinstance(image, Frame) else Frame(image)
+            first = frame.white if number == 0 else first
+            odd = "" if stored is not None else odd_white(frame, first)
             label = f"{self.path}: frame {number}"
-            yield Frame(t_ns, pixels.image, label, pixels.alpha, stored or first, odd)
+            yield replace(frame, t_ns=t_ns, label=label, white=stored or first, odd_white=odd)
 
 
 def _chosen(
-    images: Callable[[], Iterator[Image | Pixels]], inside: list[bool]
-) -> Iterator[Image | Pixels]:
+    images: Callable[[], Iterator[Image | Frame]], inside: list[bool]
+) -> Iterator[Image | Frame]:
     return compress(images(), inside)

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from adv2e.config.model import Sampling
 from adv2e.effects.frames.brightness import check_light
+from adv2e.effects.hooks import LightFrame
 from adv2e.errors import DataError
 from adv2e.light.interpolation import make_upsampler
-from adv2e.light.interpolation.linear import Timed, instant_ns, neighbours
+from adv2e.light.interpolation.linear import instant_ns, neighbours
 from adv2e.sources.times.rates import seconds
 
 FRAME_BYTES = 16 << 20
@@ -104,7 +105,7 @@ class Intervals:
         wanted = int(EVENTS * self._size / max(events, 1))
         self._size = max(1, min(self._most, 4 * self._size, wanted))
 
-    def parts(self, frames: Iterator[tuple[int, NDArray[Any]]]) -> Iterator[Part]:
+    def parts(self, frames: Iterator[LightFrame]) -> Iterator[Part]:
         """Yield the parts of the frames that follow the first; each is used up before the next.
 
         Raises
@@ -123,7 +124,7 @@ class Intervals:
         if len(self._instants) > 1:
             yield self._part(len(self._instants) - 1)
 
-    def _checked(self, frames: Iterator[Timed]) -> Iterator[Timed]:
+    def _checked(self, frames: Iterator[LightFrame]) -> Iterator[LightFrame]:
         """Yield the frames as they are."""
         number, before_ns = 0, self._first[0]
         for number, (now_ns, now) in enumerate(frames, start=1):
@@ -153,7 +154,7 @@ class Intervals:
         self._count += 1
         return self._count - 2
 
-    def _cut(self, frames: Iterator[Timed]) -> Iterator[_Instant]:
+    def _cut(self, frames: Iterator[LightFrame]) -> Iterator[_Instant]:
         """Yield the instants of all intervals."""
         upsampler = self._upsampler
         if upsampler is None:

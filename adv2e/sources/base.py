@@ -28,7 +28,6 @@ from adv2e.sources.frame import (
     OVER_BLACK,
     Frame,
     Light,
-    Pixels,
     Shot,
     Track,
     check_pixels,
@@ -112,7 +111,7 @@ class Source(ABC):
         self.ended_by_hand: int | None = None
         self.along: SensorPath | None = None
 
-    def _describe(self, first: Pixels, label: str, light: Light | None = None) -> None:
+    def _describe(self, first: Frame, label: str, light: Light | None = None) -> None:
         """Take geometry, data type and meaning of the numbers from the first frame.
 
         `light` is what they mean where the kind of source says it, and not the image.
@@ -234,43 +233,38 @@ class Source(ABC):
         )
 
     def _frame(self, shot: Shot, t_ns: int) -> Frame:
-        pixels = self._load(shot)
-        odd = "" if self._white_told is not None else odd_white(pixels, self._white_stated)
-        return Frame(
-            t_ns, pixels.image, shot.label, pixels.alpha, self.full_scale, odd, pixels.offset
-        )
-
-    def _load(self, shot: Shot) -> Pixels:
-        pixels, label = shot.load(), shot.label
-        image = pixels.image
+        """Return a frame with its time, after checking it."""
+        frame, label = shot.load(), shot.label
+        image = frame.image
         first = self.whole, self.dtype, self.colour
         this = Size(image.shape[1], image.shape[0]), image.dtype, image.ndim == 3
         if this != first:
             told = _description(*this), _description(*first)
             raise DataError(f"{label}: {told[0]}, but the first frame is {told[1]}")
-        pixels = self._wanted(pixels)
-        check_values(pixels.image, label)
-        if pixels.alpha is not None or pixels.composed:
+        frame = self._wanted(frame)
+        check_values(frame.image, label)
+        if frame.alpha is not None or frame.composed:
             self._note(OVER_BLACK)
-        if self._light_is_stated and light_of_images(pixels).encoding != self.encoding:
+        if self._light_is_stated and light_of_images(frame).encoding != self.encoding:
             self._note(
                 "not all frames state the same encoding as the first, such as"
                 f" {label}; all are taken as {self.encoding}"
             )
         if self.largest_read == 0 or self.doubt_of_white(self.largest_read):
             self.largest_read = max(self.largest_read, float(image.max()))
-        return pixels
+        odd = "" if self._white_told is not None else odd_white(frame, self._white_stated)
+        return replace(frame, t_ns=t_ns, label=label, white=self.full_scale, odd_white=odd)
 
-    def _wanted(self, pixels: Pixels) -> Pixels:
-        """Return the selected part of an image, upright, without the rest in memory."""
+    def _wanted(self, frame: Frame) -> Frame:
+        """Return the selected part of a frame, upright, without the rest in memory."""
         if self.selection.rotate180:
-            pixels = rotated180(pixels)
+            frame = rotated180(frame)
         crop = self.selection.crop
         if crop is None:
-            return pixels
+            return frame
         part = slice(crop.y, crop.y + crop.height), slice(crop.x, crop.x + crop.width)
-        alpha = None if pixels.alpha is None else pixels.alpha[part].copy()
-        return replace(pixels, image=pixels.image[part].copy(), alpha=alpha)
+        alpha = None if frame.alpha is None else frame.alpha[part].copy()
+        return replace(frame, image=frame.image[part].copy(), alpha=alpha)
 
 
 def _description(size: Size, dtype: np.dtype[Any], colour: bool) -> str:

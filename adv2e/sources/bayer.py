@@ -14,7 +14,7 @@ import numpy as np
 
 from adv2e.errors import DataError
 from adv2e.options import BAYER
-from adv2e.sources.frame import Light, Pixels, Shot
+from adv2e.sources.frame import Frame, Light, Shot
 
 # OpenCV's own names are those of the second and third pixel of the second row
 _CODES = {pattern: getattr(cv2, f"COLOR_Bayer{pattern}2RGB") for pattern in BAYER}
@@ -31,7 +31,7 @@ def in_colour(shot: Shot, pattern: str) -> Shot:
     return Shot(shot.t_ns, shot.label, partial(_load, shot.load, pattern, shot.label))
 
 
-def _load(load: Callable[[], Pixels], pattern: str, label: str) -> Pixels:
+def _load(load: Callable[[], Frame], pattern: str, label: str) -> Frame:
     mosaic = load()
     image = mosaic.image
     if image.ndim != 2 or mosaic.alpha is not None or mosaic.composed:
@@ -48,4 +48,4 @@ def _load(load: Callable[[], Pixels], pattern: str, label: str) -> Pixels:
             f"{label}: --bayer {pattern}: a mosaic must have {_SMALLEST} rows and columns at least"
         )
     colour = cv2.cvtColor(np.ascontiguousarray(image), _CODES[pattern])
-    return Pixels(np.asarray(colour), white=mosaic.white)
+    return Frame(np.asarray(colour), white=mosaic.white)

@@ -33,8 +33,10 @@ def check_pixels(width: int, height: int, label: str) -> None:
 
 
 @dataclass(frozen=True)
-class Pixels:
-    """An image as its file has it.
+class Frame:
+    """A frame as it was read: its numbers, and what its file says of them.
+
+    Loaders return it without a time; its source gives it one, with a name, and checks it.
 
     Attributes
     ----------
@@ -46,13 +48,20 @@ class Pixels:
     composed : bool
         The file has transparent pixels, and its colours are light over black already.
     white : float, optional
-        Number that means white, where the file says it and it is not that of the data type.
+        Number that means white, where that is not the one of the data type: as its file says, or
+        all frames of its source have it.
     offset : (float, float), optional
         Where on it the sensor looks, from the middle: to the right and down [its pixels].
     encoding, says : str
         What its file states of the numbers, if it does, and how; what else is to be told of that.
     densities : (int, int)
         Pixels a unit of length, across and down.
+    t_ns : int
+        Its time [ns].
+    label : str
+        Its name, for messages.
+    odd_white : str
+        How the white that its file states differs from that of the first frame.
     """
 
     image: Image
@@ -63,6 +72,9 @@ class Pixels:
     encoding: str = ""
     says: str = ""
     densities: tuple[int, int] = (1, 1)
+    t_ns: int = 0
+    label: str = ""
+    odd_white: str = ""
 
 
 OVER_BLACK = "transparent pixels are composed over black, in linear light"
@@ -98,59 +110,28 @@ class Light:
 
 
 @dataclass(frozen=True)
-class Frame:
-    """One frame.
-
-    Attributes
-    ----------
-    t_ns : int
-        Its time [ns].
-    image : array
-        As read, colour as RGB.
-    label : str
-        Its name, for messages.
-    alpha : array, optional
-        See :class:`Pixels`.
-    white : float, optional
-        Number that means white in it; None: that of the data type.
-    odd_white : str
-        How the white that its file states differs from that of the first frame.
-    offset : (float, float), optional
-        See :class:`Pixels`.
-    """
-
-    t_ns: int
-    image: Image
-    label: str = ""
-    alpha: NDArray[np.float32] | None = None
-    white: float | None = None
-    odd_white: str = ""
-    offset: Offset | None = None
-
-
-@dataclass(frozen=True)
 class Shot:
     """A frame not loaded yet: time on the source's clock [ns], name for messages, loader."""
 
     t_ns: int
     label: str
-    load: Callable[[], Pixels]
+    load: Callable[[], Frame]
 
 
-def rotated180(pixels: Pixels) -> Pixels:
-    """Return an image turned by half a turn."""
-    alpha = None if pixels.alpha is None else np.ascontiguousarray(pixels.alpha[::-1, ::-1])
-    return replace(pixels, image=np.ascontiguousarray(pixels.image[::-1, ::-1]), alpha=alpha)
+def rotated180(frame: Frame) -> Frame:
+    """Return a frame turned by half a turn."""
+    alpha = None if frame.alpha is None else np.ascontiguousarray(frame.alpha[::-1, ::-1])
+    return replace(frame, image=np.ascontiguousarray(frame.image[::-1, ::-1]), alpha=alpha)
 
 
-def odd_white(pixels: Pixels, first: float | None) -> str:
-    """Return a complaint if the white of an image differs from `first`, that of the first image.
+def odd_white(frame: Frame, first: float | None) -> str:
+    """Return a complaint if the white of a frame differs from `first`, that of the first frame.
 
     None stands for the white of the data type.  In a black image the white does not matter.
     """
-    usual = full_scale_of(pixels.image.dtype)
-    white, expected = pixels.white or usual, first or usual
-    if white == expected or not pixels.image.any():
+    usual = full_scale_of(frame.image.dtype)
+    white, expected = frame.white or usual, first or usual
+    if white == expected or not frame.image.any():
         return ""
     return (
         f"white is {white:g} in it, but {expected:g} in the first frame; say what it is in all,"
@@ -158,25 +139,20 @@ def odd_white(pixels: Pixels, first: float | None) -> str:
     )
 
 
-def as_pixels(loaded: Image | Pixels) -> Pixels:
-    """Return the result of a loader as pixels."""
-    return loaded if isinstance(loaded, Pixels) else Pixels(loaded)
-
-
-def light_of_images(pixels: Pixels, name: str = "images") -> Light:
+def light_of_images(frame: Frame, name: str = "images") -> Light:
     """Return the encoding of images, or of arrays (`name`), and the reason.
 
     It is the one that they state, else the usual one.  8-bit pictures are sRGB, nearly always in
     colour; grey ones may be a camera's own numbers, and 16-bit ones are written by cameras and by
     photo editors alike.
     """
-    if pixels.encoding:
-        return Light(pixels.encoding, pixels.says)
-    dtype, colour = pixels.image.dtype, pixels.image.ndim == 3
+    if frame.encoding:
+        return Light(frame.encoding, frame.says)
+    dtype, colour = frame.image.dtype, frame.image.ndim == 3
     depth = "floating-point" if dtype.kind == "f" else f"{8 * dtype.itemsize}-bit"
     reason = f"{depth} {'colour' if colour else 'grey'} {name}"
-    if pixels.says:
-        reason += f"; {pixels.says}"
+    if frame.says:
+        reason += f"; {frame.says}"
     is_guess = dtype.kind != "f" and not (colour and dtype == np.uint8)
     return Light(encoding_of_images(dtype), reason, is_guess=is_guess)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from adv2e.errors import DataError
 from adv2e.sources.base import GivenTimes, Selection, Source
 from adv2e.sources.bayer import in_colour, light_of
-from adv2e.sources.frame import Light, Pixels, Shot, check_values
+from adv2e.sources.frame import Frame, Light, Shot, check_values
 from adv2e.sources.times.lists import FrameList, match, read_list
 from adv2e.sources.times.rates import gap_doubts, numbering_doubt
 
@@ -20,7 +20,7 @@ class Picture:
 
     label: str
     path: str | None
-    load: Callable[[], Pixels]
+    load: Callable[[], Frame]
 
 
 @dataclass(frozen=True)

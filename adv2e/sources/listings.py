@@ -30,7 +30,7 @@ from pathlib import Path, PurePosixPath
 from adv2e.errors import DataError
 from adv2e.files.zips import Members
 from adv2e.sources.base import GivenTimes, Selection
-from adv2e.sources.frame import Light, Pixels
+from adv2e.sources.frame import Frame, Light
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, decode_image
 from adv2e.sources.listed import ListedSource, Picture, timed
 from adv2e.sources.times.lists import decoded, first_name, member_of, members_of, parse_list
@@ -149,5 +149,5 @@ def _has(files: Members, folder: PurePosixPath, member: str) -> bool:
     return files.has(str(folder / member))
 
 
-def _read_image(files: Members, member: str) -> Pixels:
+def _read_image(files: Members, member: str) -> Frame:
     return decode_image(files.read(member), files.label(member))

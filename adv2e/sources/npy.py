@@ -21,7 +21,7 @@ from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
 from adv2e.files.zips import Header, read_array, read_header
 from adv2e.sources.base import GivenTimes, Selection
-from adv2e.sources.frame import Pixels, check_pixels
+from adv2e.sources.frame import Frame, check_pixels
 from adv2e.sources.listed import ListedSource, Picture, Timed, timed
 from adv2e.sources.times.lists import FrameList, read_list
 from adv2e.sources.times.rates import Stamp, frame_unit
@@ -88,7 +88,7 @@ class _Stack:
         self._path, self._header = path, header
         self._whole: NDArray[Any] | None = None
 
-    def read(self, number: int) -> Pixels:
+    def read(self, number: int) -> Frame:
         """Return a frame in the machine's byte order; DataError if it is not there."""
         header, label = self._header, f"{self._path}: frame {number}"
         try:
@@ -105,7 +105,7 @@ class _Stack:
         except OSError as error:
             raise DataError(f"{label}: {error.strerror or error}") from error
         native = header.dtype.newbyteorder("=")
-        return Pixels(np.require(image.reshape(self._shape), native, ["C"]))
+        return Frame(np.require(image.reshape(self._shape), native, ["C"]))
 
 
 def _read_whole(path: Path) -> NDArray[Any]:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from adv2e.errors import DataError, UsageError
 from adv2e.sources.base import GivenTimes, Selection, Source
-from adv2e.sources.frame import Pixels, Shot
+from adv2e.sources.frame import Shot
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, read_image
 from adv2e.sources.paths import SensorPath
 from adv2e.sources.times.rates import NS_PER_S, FrameRate
@@ -54,9 +54,9 @@ class StillSource(Source):
         self, path: Path, given: GivenTimes, selection: Selection, along: SensorPath
     ) -> None:
         super().__init__(path, "still", selection, has_clock=False)
-        self._pixels = read_image(path)
-        self._describe(self._pixels, str(path))
-        self.largest = float(self._pixels.image.max())
+        self._picture = read_image(path)
+        self._describe(self._picture, str(path))
+        self.largest = float(self._picture.image.max())
         rate = given.rate
         whole = Fraction(str(along.duration))
         if rate is None:
@@ -77,9 +77,5 @@ class StillSource(Source):
         for number in range(self.count or 0):
             t_ns = self._rate.time_ns(number)
             offset = self._along.at(min(1.0, t_ns / self._end_ns))
-            pixels = replace(self._pixels, offset=offset)
-            yield Shot(t_ns, f"{self.path}: frame {number}", partial(_as_it_is, pixels))
-
-
-def _as_it_is(pixels: Pixels) -> Pixels:
-    return pixels
+            frame = replace(self._picture, offset=offset)
+            yield Shot(t_ns, f"{self.path}: frame {number}", partial(replace, frame))

@@ -12,7 +12,7 @@ from adv2e.errors import DataError
 from adv2e.files.zips import Members
 from adv2e.sources import davis240c
 from adv2e.sources.base import GivenTimes, Selection
-from adv2e.sources.frame import Pixels
+from adv2e.sources.frame import Frame
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, decode_image
 from adv2e.sources.images.source import LISTS, in_order
 from adv2e.sources.listed import ListedSource, Picture, timed
@@ -80,5 +80,5 @@ def _found_list(folder: PurePosixPath, files: Members) -> str | None:
     return next(filter(files.has, places), None)
 
 
-def _read_image(files: Members, member: str) -> Pixels:
+def _read_image(files: Members, member: str) -> Frame:
     return decode_image(files.read(member), files.label(member))

@@ -50,7 +50,7 @@ class Pixel:
 
         def frames() -> Iterator[Frame]:
             for t_ns, image in zip(clip.times_ns.tolist(), clip.frames, strict=True):
-                yield Frame(t_ns, image, white=255.0)
+                yield Frame(image, white=255.0, t_ns=t_ns)
 
         # the clip is on the sensor already, whatever camera the configuration is of
         config = replace(self.config, sensor=None)

@@ -26,7 +26,7 @@ def calls(monkeypatch):
 
 def frames():
     for n, dn in enumerate((51, 255)):
-        yield Frame(1_468_941_032_229_165_300 + n, np.full((2, 3), dn, np.uint8))
+        yield Frame(np.full((2, 3), dn, np.uint8), t_ns=1_468_941_032_229_165_300 + n)
 
 
 def test_frames_are_simulated_anew_for_each_seed(calls):

@@ -47,11 +47,11 @@ def test_frames_do_not_depend_on_how_many_were_read_early(
     monkeypatch.setattr(module, "EARLY_BYTES", early)
     with Reading(stack, fps=10, threads=threads) as reading:
         decoding = as_light(reading.source, coded=coded, with_pictures=True)
-        stills = list(reading.stills(decoding))
-    assert [still.t_ns for still in stills] == [k * 10**8 for k in range(len(FRAMES))]
-    for still, frame in zip(stills, FRAMES, strict=True):
-        assert np.array_equal(still.picture, frame)
-        assert np.array_equal(still.light, frame if coded else decoding.decoder.decode(frame))
+        decoded = list(reading.decoded(decoding))
+    assert [t_ns for (t_ns, _), _ in decoded] == [k * 10**8 for k in range(len(FRAMES))]
+    for ((_, light), picture), frame in zip(decoded, FRAMES, strict=True):
+        assert np.array_equal(picture, frame)
+        assert np.array_equal(light, frame if coded else decoding.decoder.decode(frame))
     assert own_threads() == []
 
 
@@ -64,14 +64,14 @@ def test_reading_begins_before_it_is_known_what_for_and_stops_at_its_limit(
         time.sleep(0.05)
         # a source looks at its second frame before it hands out the first
         assert len(loaded) <= 11
-        assert len(list(reading.stills(as_light(reading.source)))) == len(FRAMES)
+        assert len(list(reading.decoded(as_light(reading.source)))) == len(FRAMES)
 
 
 def test_with_one_thread_nothing_is_read_before_it_is_asked_for(stack, loaded):
     with Reading(stack, fps=10, threads=1) as reading:
         assert own_threads() == []
         assert loaded == []
-        next(reading.stills(as_light(reading.source)))
+        next(reading.decoded(as_light(reading.source)))
         assert len(loaded) <= 3
 
 
@@ -88,10 +88,10 @@ def test_what_is_wrong_with_a_frame_is_told_when_it_is_taken(tmp_path, threads):
     frames[3, 0, 0] = np.nan
     np.save(tmp_path / "stack.npy", frames)
     with Reading(str(tmp_path / "stack.npy"), fps=10, threads=threads) as reading:
-        stills = reading.stills(as_light(reading.source))
-        assert next(stills).t_ns == 0
+        decoded = reading.decoded(as_light(reading.source))
+        assert next(decoded)[0][0] == 0
         with pytest.raises(DataError, match="NaN"):
-            list(stills)
+            list(decoded)
 
 
 @pytest.mark.parametrize("threads", [1, 2])

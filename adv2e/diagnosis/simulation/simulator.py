@@ -22,11 +22,11 @@ from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.simulation.affordable import FINE
 from adv2e.effects.frames.misregistration import shifted
-from adv2e.effects.hooks import Hooks
+from adv2e.effects.hooks import Hooks, LightFrame
 from adv2e.effects.readout.frame_coupling import FrameCouplingHooks
 from adv2e.events import Events
 from adv2e.light.interpolation import make_upsampler
-from adv2e.light.interpolation.linear import Timed, instant_ns, neighbours
+from adv2e.light.interpolation.linear import instant_ns, neighbours
 from adv2e.pixel.steps import PRECISE, Coarseness
 
 # ---- Progress of a diagnosis.
@@ -243,7 +243,7 @@ def _after(
     acting: Frames, config: Config, times_ns: list[int], light: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     """Return the light of frames after some of the effects on it."""
-    frames: Iterator[Timed] = zip(times_ns, light, strict=True)
+    frames: Iterator[LightFrame] = zip(times_ns, light, strict=True)
     for hook in frame_hooks(acting, config.sampling):
         frames = hook.light(frames)
     return np.array([one for _, one in frames], np.float32)

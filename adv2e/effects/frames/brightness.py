@@ -9,14 +9,16 @@ frame, an encoding, an effect, an interpolation.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from adv2e.errors import DataError
 from adv2e.ticks import check_time
+
+if TYPE_CHECKING:
+    from adv2e.effects.hooks import Frames
 
 UNSTATED = 16.0
 """Floats so many times white are refused where nobody said what white is."""
@@ -64,9 +66,7 @@ def check_floats(image: NDArray[Any], label: str, full_scale: float | None) -> N
         check_white(float(image.max()), label, full_scale)
 
 
-def bounded(
-    frames: Iterator[tuple[int, NDArray[Any]]], table: NDArray[np.float32] | None
-) -> Iterator[tuple[int, NDArray[Any]]]:
+def bounded(frames: Frames, table: NDArray[np.float32] | None) -> Frames:
     """Yield (t_ns, light) as they come, light and time of each looked at; names a frame it refuses.
 
     `table`: light [DN] of the values of frames that are not decoded yet.

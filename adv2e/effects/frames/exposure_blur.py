@@ -45,7 +45,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.effects.hooks import Frames, Hooks
+from adv2e.effects.hooks import Frames, Hooks, LightFrame
 from adv2e.kernel.effect_loops import sharpen
 
 LABELS = {
@@ -151,7 +151,7 @@ class ExposureBlurHooks(Hooks):
 
     def light(self, frames: Frames) -> Frames:
         """Yield the light at the times of the frames, a block at a time."""
-        held: list[tuple[int, NDArray[Any]]] = []
+        held: list[LightFrame] = []
         done = 0  # of those held: the margin before the block
         for t_ns, light in frames:
             held.append((t_ns, np.ascontiguousarray(light)))
@@ -163,7 +163,7 @@ class ExposureBlurHooks(Hooks):
                 done = end - keep
         yield from self._block(held, done, len(held))
 
-    def _block_end(self, held: list[tuple[int, NDArray[Any]]], begin: int) -> int:
+    def _block_end(self, held: list[LightFrame], begin: int) -> int:
         """Return the end of the block that starts at `begin`, 0 while frames are missing."""
         start, newest = held[begin][0] if begin < len(held) else held[-1][0], held[-1][0]
         span = _BLOCK_EXPOSURES * self._exposure
@@ -174,14 +174,14 @@ class ExposureBlurHooks(Hooks):
                 return end if enough else 0
         return 0
 
-    def _first_of_margin(self, held: list[tuple[int, NDArray[Any]]], begin: int) -> int:
+    def _first_of_margin(self, held: list[LightFrame], begin: int) -> int:
         """Return the first frame that the block starting at `begin` needs before it."""
         first = max(0, begin - _MARGIN_FRAMES)
         while first > 0 and held[begin][0] - held[first][0] < _MARGIN_EXPOSURES * self._exposure:
             first -= 1
         return first
 
-    def _block(self, held: list[tuple[int, NDArray[Any]]], begin: int, end: int) -> Frames:
+    def _block(self, held: list[LightFrame], begin: int, end: int) -> Frames:
         """Yield the frames begin..end of those held, sharpened."""
         if begin == end:
             return

@@ -41,12 +41,11 @@ import math
 from bisect import bisect_left
 from collections import deque
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.effects.hooks import Frames, Hooks, Times, View
+from adv2e.effects.hooks import Frames, Hooks, LightFrame, Times, View
 from adv2e.parameters import Fit, Section, parameter
 
 LABELS = {
@@ -151,7 +150,7 @@ class FrameCouplingHooks(Hooks):
             yield from self._light_beside(frames)
             return
         ahead_ns = max(0, math.ceil(-self._delay_s * 1e9))
-        held: deque[tuple[int, NDArray[Any]]] = deque()
+        held: deque[LightFrame] = deque()
         for number, frame in enumerate(frames):
             leap_s = frame[0] * 1e-9 + self._delay_s
             if number % self._every == 0 and leap_s >= self.view.start_s - _SAME_S:

@@ -17,12 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.background import worker_pool
+from adv2e.effects.hooks import LightFrame
 
 # ---- A sequence of frames as its intervals, each with the frames beside it.
-
-
-Timed = tuple[int, NDArray[Any]]
-"""Time [ns] and light [DN] of a frame."""
 
 
 @dataclass(frozen=True)
@@ -66,10 +63,10 @@ def ordered(
             yield from pool.map(frame, range(start, min(start + threads, count)))
 
 
-def neighbours(frames: Iterable[Timed]) -> Iterator[tuple[Timed, Timed, Beside]]:
+def neighbours(frames: Iterable[LightFrame]) -> Iterator[tuple[LightFrame, LightFrame, Beside]]:
     """Yield each pair of neighbours with what lies beside it; reads one frame ahead."""
     coming = iter(frames)
-    before: Timed | None = None
+    before: LightFrame | None = None
     first, second = next(coming, None), next(coming, None)
     while first is not None and second is not None:
         after = next(coming, None)

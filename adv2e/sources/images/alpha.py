@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
-from adv2e.sources.frame import Image, Pixels
+from adv2e.sources.frame import Frame, Image
 
 
 class Alpha(Enum):
@@ -26,7 +26,7 @@ class Alpha(Enum):
     NONE = "none"
 
 
-def with_alpha(colours: Image, alpha: NDArray[Any], kind: Alpha, most: float, label: str) -> Pixels:
+def with_alpha(colours: Image, alpha: NDArray[Any], kind: Alpha, most: float, label: str) -> Frame:
     """Return the pixels of an image with alpha of the data type of its grey or RGB colours.
 
     `most` is the alpha of pixels that are all there, and white of whole numbers; `label` is the
@@ -38,7 +38,7 @@ def with_alpha(colours: Image, alpha: NDArray[Any], kind: Alpha, most: float, la
         The file does not say what the channel is, and it is not the same everywhere.
     """
     if kind is Alpha.NONE or float(alpha.min()) >= most:
-        return Pixels(colours)
+        return Frame(colours)
     if kind is Alpha.UNSAID:
         raise DataError(
             f"{label}: a channel beyond the colours, and its header does not say that it is alpha"
@@ -46,10 +46,10 @@ def with_alpha(colours: Image, alpha: NDArray[Any], kind: Alpha, most: float, la
         )
     share = np.clip(alpha.astype(np.float32) / np.float32(most), 0, 1)
     if kind is Alpha.STRAIGHT:
-        return Pixels(colours, share)
+        return Frame(colours, share)
     if colours.dtype.kind == "f":
-        return Pixels(colours, composed=True)
-    return Pixels(_divided(colours, share, most), share)
+        return Frame(colours, composed=True)
+    return Frame(_divided(colours, share, most), share)
 
 
 def _divided(colours: Image, share: NDArray[np.float32], most: float) -> Image:

@@ -68,7 +68,7 @@ class Header:
     clear : int, optional
         Grey value of pixels that are not there, in the bits that OpenCV returns.
     encoding, says : str
-        See :class:`adv2e.sources.frame.Pixels`.
+        See :class:`adv2e.sources.frame.Frame`.
     densities : (int, int)
         Pixels a unit of length, across and down; they are square if these are the same.
     """

@@ -20,7 +20,7 @@ import numpy as np
 from adv2e.effects.frames.encoding import full_scale_of, is_light
 from adv2e.errors import DataError, MissingExtraError
 from adv2e.process.standard_error import overhearing
-from adv2e.sources.frame import Image, Pixels, check_pixels
+from adv2e.sources.frame import Frame, Image, check_pixels
 from adv2e.sources.images import headers
 from adv2e.sources.images.alpha import Alpha, with_alpha
 from adv2e.sources.images.headers import Header, check_size, read_header
@@ -71,7 +71,7 @@ def rgb_of(image: Any) -> Image:
     return np.asarray(cv2.cvtColor(image, code))
 
 
-def read_image(path: Path) -> Pixels:
+def read_image(path: Path) -> Frame:
     """Return the image in a file, all its bits kept; DataError if it cannot be read."""
     try:
         data = path.read_bytes()
@@ -80,7 +80,7 @@ def read_image(path: Path) -> Pixels:
     return decode_image(data, str(path))
 
 
-def decode_image(data: bytes, label: str) -> Pixels:
+def decode_image(data: bytes, label: str) -> Frame:
     """Return the image in the bytes of a file: upright, grey or RGB, data type as stored.
 
     `label` is its name, for messages; its suffix tells EXR from the rest.
@@ -109,10 +109,10 @@ def decode_image(data: bytes, label: str) -> Pixels:
         )
     image, orientation, says = _decoded(data, label)
     image = upright(image, orientation)
-    return _pixels(image, header, header.says or says, label)
+    return _frame(image, header, header.says or says, label)
 
 
-def _pixels(image: Any, header: Header, says: str, label: str) -> Pixels:
+def _frame(image: Any, header: Header, says: str, label: str) -> Frame:
     """Return an image as OpenCV gives it, with what its header says of alpha, white and light."""
     colours, alpha = rgb_of(image), _fourth(image)
     if header.grey:
@@ -130,7 +130,7 @@ def _pixels(image: Any, header: Header, says: str, label: str) -> Pixels:
         "densities": header.densities,
     }
     if alpha is None:
-        return Pixels(colours, white=white, **stated)
+        return Frame(colours, white=white, **stated)
     most = full_scale_of(colours.dtype)
     return replace(with_alpha(colours, alpha, header.alpha, most, label), **stated)
 
@@ -149,19 +149,19 @@ def upright(image: Image, orientation: int) -> Image:
     return np.ascontiguousarray(image)
 
 
-def _decode_tiff(data: bytes, label: str) -> Pixels:
+def _decode_tiff(data: bytes, label: str) -> Frame:
     header = headers.examine(data, label)
     if header is None:
         raise _unreadable(label)
     image, _, says = _decoded(header.data, label)  # upright
     colours, alpha, white = rgb_of(image), _fourth(image), header.white
     if not is_light(colours.dtype):  # its source refuses it
-        return Pixels(colours)
+        return Frame(colours)
     most = white or full_scale_of(colours.dtype)
     if header.inverted:
         colours = np.asarray(most - colours).astype(colours.dtype)
     if alpha is None:
-        return Pixels(colours, white=white, says=says)
+        return Frame(colours, white=white, says=says)
     return replace(with_alpha(colours, alpha, header.alpha, most, label), white=white, says=says)
 
 
@@ -212,7 +212,7 @@ def _is_whole(data: bytes) -> bool:
     return not data.startswith(b"\xff\xd8") or data.find(b"\xff\xd9", data.rfind(b"\xff\xda")) > 0
 
 
-def _decode_exr(data: bytes, label: str) -> Pixels:
+def _decode_exr(data: bytes, label: str) -> Frame:
     # not through OpenCV: its wheels differ in whether they read EXR at all
     try:
         openexr: Any = importlib.import_module("OpenEXR")
@@ -239,7 +239,7 @@ def _decode_exr(data: bytes, label: str) -> Pixels:
             alpha = channels.get("A") if image.ndim == 2 or image.shape[2] < 4 else image[..., 3]
             colours = np.ascontiguousarray(image[..., :3]) if image.ndim == 3 else image
             if alpha is None:
-                return Pixels(colours)
+                return Frame(colours)
             # by convention its colours are light that is multiplied by alpha
             return with_alpha(colours, np.asarray(alpha), Alpha.MULTIPLIED, 1.0, label)
     raise DataError(f"{label}: EXR without channels R, G, B or Y; it has {', '.join(channels)}")

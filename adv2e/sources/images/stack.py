@@ -14,7 +14,7 @@ from typing import IO
 
 from adv2e.errors import DataError
 from adv2e.sources.base import GivenTimes, Selection
-from adv2e.sources.frame import Pixels
+from adv2e.sources.frame import Frame
 from adv2e.sources.images.headers import is_tiff
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.listed import ListedSource, Picture
@@ -272,5 +272,5 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     return ListedSource(path, "tiff", times, selection, has_clock=given.fps is None)
 
 
-def _load(pages: Pages, number: int, label: str) -> Pixels:
+def _load(pages: Pages, number: int, label: str) -> Frame:
     return decode_image(pages.read(number), label)

@@ -171,7 +171,7 @@ class PipeSource(Source):
 
     def _shot(self, number: int, data: bytes) -> Shot:
         label = f"{NAME}: frame {number}"
-        shot = Shot(self._time_ns(number), label, partial(self._layout.pixels, data, label))
+        shot = Shot(self._time_ns(number), label, partial(self._layout.frame, data, label))
         return shot if self.selection.bayer is None else in_colour(shot, self.selection.bayer)
 
     def shots(self) -> Iterator[Shot]:

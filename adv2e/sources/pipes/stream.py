@@ -18,7 +18,7 @@ import numpy as np
 from adv2e.errors import DataError
 from adv2e.geometry import MOST_PIXELS, Size
 from adv2e.process.signals import Interrupt, wait_for
-from adv2e.sources.frame import Image, Light, Pixels
+from adv2e.sources.frame import Frame, Image, Light
 from adv2e.sources.times.rates import FrameRate, parse_rate
 from adv2e.sources.video.pictures import UNSTATED, encoding_of, rgb_of_planes
 
@@ -34,8 +34,8 @@ class Layout:
     kind : str
         ``y4m`` or ``raw``.
     nbytes : int
-    pixels : callable
-        Returns the pixels of a frame from its bytes and its name for messages.
+    frame : callable
+        Returns a frame from its bytes and its name for messages.
     light : Light
         Encoding and white of the numbers.
     rate : FrameRate, optional
@@ -48,7 +48,7 @@ class Layout:
 
     kind: str
     nbytes: int
-    pixels: Callable[[bytes, str], Pixels]
+    frame: Callable[[bytes, str], Frame]
     light: Light
     rate: FrameRate | None = None
     marked: bool = False
@@ -63,12 +63,12 @@ def check_size(width: int, height: int) -> None:
         )
 
 
-def pixels_of(image: Image, bits: int, label: str) -> Pixels:
+def in_range(image: Image, bits: int, label: str) -> Frame:
     """Return the pixels of an image of so many bits, lowest bits used; DataError if it has more."""
     white, largest = (1 << bits) - 1, int(image.max())
     if largest > white:
         raise DataError(f"{label}: a number of {largest}, above the {white} of {bits} bits")
-    return Pixels(image)
+    return Frame(image)
 
 
 def white_of(bits: int) -> float | None:
@@ -207,7 +207,7 @@ class _Picture:
         each = 2 if self.bits > 8 else 1
         return sum(rows * columns * each for rows, columns in self.shapes)
 
-    def pixels(self, data: bytes, label: str) -> Pixels:
+    def frame(self, data: bytes, label: str) -> Frame:
         """Return the pixels of a frame."""
         numbers = np.frombuffer(data, "<u2" if self.bits > 8 else "u1")
         planes, at = [], 0
@@ -216,14 +216,14 @@ class _Picture:
             at += rows * columns
         kind = f"u{numbers.itemsize}"
         if len(planes) == 1 and self.full:
-            return pixels_of(planes[0].astype(kind), self.bits, label)
+            return in_range(planes[0].astype(kind), self.bits, label)
         codes = [plane.astype(np.float32) for plane in planes]
         if len(planes) == 1:
             image = (codes[0] - np.float32(16 << self.bits - 8)) / np.float32(219 << self.bits - 8)
         else:
             image = rgb_of_planes(codes, UNSTATED, self.bits, full=self.full)
         whole = np.rint(np.clip(image, 0, 1) * ((1 << self.bits) - 1)).astype(kind)
-        return pixels_of(np.ascontiguousarray(whole), self.bits, label)
+        return in_range(np.ascontiguousarray(whole), self.bits, label)
 
 
 def y4m_layout(stream: Stream) -> Layout:
@@ -265,7 +265,7 @@ def y4m_layout(stream: Stream) -> Layout:
     return Layout(
         "y4m",
         picture.nbytes,
-        picture.pixels,
+        picture.frame,
         light,
         _rate(stated.get("F", "0:0")),
         marked=True,
@@ -326,12 +326,12 @@ def raw_layout(size: Size, name: str) -> Layout:
     deep = form.bits > 8 and len(form.channels) == 1
     light = Light("linear" if deep else "srgb", f"raw video of {name}", white_of(form.bits))
     nbytes = size.width * size.height * len(form.channels) * np.dtype(form.dtype).itemsize
-    return Layout("raw", nbytes, partial(_pixels, size, form), light)
+    return Layout("raw", nbytes, partial(_frame, size, form), light)
 
 
-def _pixels(size: Size, form: _Format, data: bytes, label: str) -> Pixels:
+def _frame(size: Size, form: _Format, data: bytes, label: str) -> Frame:
     dtype = np.dtype(form.dtype)
     numbers = np.frombuffer(data, dtype).reshape(size.height, size.width, -1)
     channels = form.channels if len(form.channels) > 1 else form.channels[0]
     image = np.require(numbers[..., channels], dtype.newbyteorder("="), ["C", "W"])
-    return pixels_of(image, form.bits, label)
+    return in_range(image, form.bits, label)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from adv2e.effects.frames.encoding import UNKNOWN
 from adv2e.errors import DataError
-from adv2e.sources.frame import Pixels
+from adv2e.sources.frame import Frame
 
 # ---- Transfers by which videos state their light, and the encoding of frames behind each.
 #
@@ -127,7 +127,7 @@ class Converter:
         self._scaler = VideoReformatter()
         self._latest: tuple[Any, ...] = ()
 
-    def pixels(self, frame: Any, label: str) -> Pixels:
+    def frame(self, picture: Any, label: str) -> Frame:
         """Return a picture as grey or RGB of uint8 or uint16, white 255 or 65535.
 
         Raises
@@ -136,17 +136,17 @@ class Converter:
             Its pixels are of a kind that cannot be converted.
         """
         try:
-            image = self.codes(frame)
+            image = self.codes(picture)
         except (ValueError, OSError) as error:
             raise DataError(f"{label}: {error}") from error
-        turn = _TURNS.get(_signs(frame))
+        turn = _TURNS.get(_signs(picture))
         if turn is not None:
             image = np.asarray(cv2.rotate(image, turn))
         if image.ndim == 2 or image.shape[2] == 3:
-            return Pixels(image)
+            return Frame(image)
         white, alpha = np.iinfo(image.dtype).max, image[..., 3]
         there = None if alpha.min() == white else alpha.astype(np.float32) / np.float32(white)
-        return Pixels(np.ascontiguousarray(image[..., :3]), there)
+        return Frame(np.ascontiguousarray(image[..., :3]), there)
 
     def codes(self, frame: Any) -> NDArray[Any]:
         """Return the codes of a picture as (rows, columns, 3) RGB, or (rows, columns).

@@ -85,7 +85,7 @@ class VideoSource(Source):
             light = Light("linear", "16-bit grey video")
         self._meaning = encoding_of(transfer)
         label = f"{self.path}: frame 0"
-        self._describe(Converter().pixels(first, label), label, light)
+        self._describe(Converter().frame(first, label), label, light)
 
     def _given_times(self, given: GivenTimes) -> Callable[[int], int] | None:
         """Return the times that replace those in the file: a function of a frame's number."""
@@ -188,7 +188,7 @@ class VideoSource(Source):
                     self._note(f"{label}: its time is that of frames before: left out")
                     continue
                 latest_ns = t_ns
-                yield Shot(t_ns, label, partial(converter.pixels, frame, label))
+                yield Shot(t_ns, label, partial(converter.frame, frame, label))
         if guessed:
             self._note(f"{self.path}: the decoder met errors in {guessed} of {count} frames")
         if self._listed is not None and self._listed != count:
