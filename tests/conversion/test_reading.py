@@ -23,13 +23,13 @@ def stack(tmp_path):
 def loaded(monkeypatch):
     """Names of the frames that were loaded so far."""
     labels = []
-    load = Source._load
+    read = Source._frame
 
-    def counted(self, shot):
+    def counted(self, shot, t_ns):
         labels.append(shot.label)
-        return load(self, shot)
+        return read(self, shot, t_ns)
 
-    monkeypatch.setattr(Source, "_load", counted)
+    monkeypatch.setattr(Source, "_frame", counted)
     return labels
 
 
