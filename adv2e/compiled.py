@@ -70,7 +70,11 @@ def code_cache() -> CodeCache:
 
 
 class Compiled:
-    """Compiled function; Numba's attributes of it are those of its `dispatcher`."""
+    """Compiled function, in two forms.
+
+    Python calls its `entry`, compiled functions its `dispatcher`.  The latter has no wrapper that
+    unpacks Python's objects: for records of arrays it takes longer to compile than the rest.
+    """
 
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
         update_wrapper(self, function)
@@ -80,13 +84,11 @@ class Compiled:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it; it is compiled for each new kind of arguments."""
-        return self.dispatcher(*arguments)
+        return self.entry(*arguments)
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):  # asked of all objects, by whoever copies or inspects
+        if name not in ("dispatcher", "entry"):
             raise AttributeError(name)
-        if name != "dispatcher":
-            return getattr(self.dispatcher, name)
         with _MAKING:
             if name not in self.__dict__:
                 path = Path(self.function.__code__.co_filename).resolve()
@@ -95,6 +97,7 @@ class Compiled:
                     code_cache(),
                     # the name of the folder stands for the sources of this package alone
                     kept=not self.is_inlined and _PACKAGE in path.parents,
+                    called_from_python=name == "entry",
                     **self._options,
                 )
         return self.__dict__[name]

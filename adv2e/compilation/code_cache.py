@@ -140,7 +140,7 @@ def _bases() -> list[Path]:
 
 def _code(folder: Path) -> dict[str, Path]:
     """Return each file of code, by its name below `folder`."""
-    return {path.relative_to(folder).as_posix(): path for path in sorted(folder.glob("*/*"))}
+    return {path.relative_to(folder).as_posix(): path for path in sorted(folder.rglob("*.nb?"))}
 
 
 def _digest(path: Path) -> str:

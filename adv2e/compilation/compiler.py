@@ -66,20 +66,29 @@ _numba, _event, _typeof = _import_numba()
 
 
 def make_dispatcher(
-    function: Callable[..., Any], cache: CodeCache, *, kept: bool, **options: Any
+    function: Callable[..., Any],
+    cache: CodeCache,
+    *,
+    kept: bool,
+    called_from_python: bool,
+    **options: Any,
 ) -> Any:
     """Return Numba's stand-in for a function, whose code is kept in `cache`.
 
     Numba looks at its setting for the folder when a function is decorated; whoever else uses Numba
-    in this process keeps his own.
+    in this process keeps his own.  Code with and without a wrapper for Python has the same name
+    there, and so a folder each.
     """
     config = _numba.config
-    before, config.CACHE_DIR = config.CACHE_DIR, str(cache.folder or "")
+    form = "entries" if called_from_python else "parts"
+    before, config.CACHE_DIR = config.CACHE_DIR, str(cache.folder / form if cache.folder else "")
     try:
         return _numba.njit(
             nogil=True,
             error_model="numpy",
             fastmath={"contract"},
+            no_cpython_wrapper=not called_from_python,
+            no_cfunc_wrapper=True,
             cache=kept and cache.folder is not None,
             **options,
         )(function)

@@ -34,7 +34,7 @@ RUN = """
 import sys
 from adv2e.outer import outer
 results = [outer(float(a) if "." in a else int(a)) for a in sys.argv[1:]]
-print(*results, sum(outer.stats.cache_hits.values()), sep=" ")
+print(*results, sum(outer.entry.stats.cache_hits.values()), sep=" ")
 """
 
 
