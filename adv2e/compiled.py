@@ -87,8 +87,10 @@ class Compiled:
         return self.entry(*arguments)
 
     def __getattr__(self, name: str) -> Any:
-        if name not in ("dispatcher", "entry"):
+        if name.startswith("_"):  # asked of all objects, by whoever copies or inspects
             raise AttributeError(name)
+        if name not in ("dispatcher", "entry"):  # Numba asks for what it inlines
+            return getattr(self.dispatcher, name)
         with _MAKING:
             if name not in self.__dict__:
                 path = Path(self.function.__code__.co_filename).resolve()

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import kernel
+from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel, screen, static_pixels
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.cascade import advance as cascade
@@ -139,7 +139,7 @@ def _screen(strip, end, length, circuit, rule):
     )  # fmt: skip
 
 
-@kernel
+@inlined
 def _solve_flagged(lo, m, interval, circuit, rule, state, memory, buffer, n):
     """Solve the m pixels whose numbers are in memory.pixels, in lanes."""
     waiting = batch.held_first(m, memory.rows, memory.pixels)
@@ -179,7 +179,7 @@ def _rule(rules, f):
     )  # fmt: skip
 
 
-@kernel
+@inlined
 def _strip(lo, count, schedule, circuit, rules, plan, state, memory, buffer, n):
     """Advance one strip of the exact circuit over all intervals."""
     schedule, rules, state, memory = borrowed(schedule, rules, state, memory)
