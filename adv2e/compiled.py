@@ -72,8 +72,9 @@ def code_cache() -> CodeCache:
 class Compiled:
     """Compiled function, in two forms.
 
-    Python calls its `entry`, compiled functions its `dispatcher`.  The latter has no wrapper that
-    unpacks Python's objects: for records of arrays it takes longer to compile than the rest.
+    Python calls its `entry`, compiled functions its `dispatcher`, of which Numba's attributes are
+    those of this.  The latter has no wrapper that unpacks Python's objects: for records of arrays
+    that takes longer to compile than the rest.
     """
 
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
@@ -89,7 +90,7 @@ class Compiled:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # asked of all objects, by whoever copies or inspects
             raise AttributeError(name)
-        if name not in ("dispatcher", "entry"):  # Numba asks for what it inlines
+        if name not in ("dispatcher", "entry"):
             return getattr(self.dispatcher, name)
         with _MAKING:
             if name not in self.__dict__:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import inlined, kernel
+from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel, screen, static_pixels
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.cascade import advance as cascade
@@ -139,7 +139,7 @@ def _screen(strip, end, length, circuit, rule):
     )  # fmt: skip
 
 
-@inlined
+@kernel
 def _solve_flagged(lo, m, interval, circuit, rule, state, memory, buffer, n):
     """Solve the m pixels whose numbers are in memory.pixels, in lanes."""
     waiting = batch.held_first(m, memory.rows, memory.pixels)
@@ -179,10 +179,10 @@ def _rule(rules, f):
     )  # fmt: skip
 
 
-@inlined
+@kernel
 def _strip(lo, count, schedule, circuit, rules, plan, state, memory, buffer, n):
     """Advance one strip of the exact circuit over all intervals."""
-    schedule, rules, state, memory = borrowed(schedule, rules, state, memory)
+    schedule, all_rules, state, memory = borrowed(schedule, rules, state, memory)
     frames, before, share, starts = (
         schedule.frames, schedule.before, schedule.share, schedule.starts,
     )  # fmt: skip
@@ -225,11 +225,13 @@ def _strip(lo, count, schedule, circuit, rules, plan, state, memory, buffer, n):
             static_pixels.end_rest(lo, count, circuit, state, strip)
         resting = False
         interval = Interval(f, start, starts[f], starts[f + 1] - starts[f])
-        # of None the compiler knows that it is none: it compiles one of the two
+        # of an argument that is None the compiler knows it, and compiles one of the two
         if plan is None:
-            n, buffer = _advance_strip(
-                lo, count, interval, circuit, _rule(rules, f), state, own, buffer, n
-            )
+            if rules is not None:
+                rule = _rule(all_rules, f)
+                n, buffer = _advance_strip(
+                    lo, count, interval, circuit, rule, state, own, buffer, n
+                )
         else:
             n, buffer = cascade.advance(
                 lo, count, interval, number, still and settled, circuit, plan, state, memory,
@@ -253,8 +255,8 @@ def run_exact(claimed, most, schedule, circuit, rules, plan, state, memory, buff
     most : int
         Strips after which to return, though there may be more.
     schedule : Schedule
-    rules : Rules
-        Quadrature for each interval.
+    rules : Rules or None
+        Quadrature for each interval; None where the cascade does.
     plan : Plan or None
         How each interval is cut for the cascade; None where lanes do.
     buffer : EventBuffer

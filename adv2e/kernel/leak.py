@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from adv2e.compiled import kernel
+from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel, rng, screen, special
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.noise import hot_rate_of
@@ -24,13 +24,13 @@ _TRIES = 100
 """Ages that are drawn for a pixel; none of them is left only where noise leaves leak no time."""
 
 
-@kernel
+@inlined
 def leak_rate(light, circuit):
     """Speed at which leak lowers the reference in `light` [DN], in ON thresholds a us."""
     return circuit.leak + circuit.photo_leak * light
 
 
-@kernel
+@inlined
 def fall_over(on, length, mean, circuit):
     """Fall of the reference over `length` us [ln units]; `on`: ON threshold, `mean`: light [DN].
 

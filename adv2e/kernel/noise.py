@@ -8,14 +8,14 @@ from __future__ import annotations
 import math
 
 from adv2e.causes import HOT_PIXEL, SHOT_NOISE, SIGNAL
-from adv2e.compiled import kernel
+from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel, rng
 
 NONE, SHOT, HOT = SIGNAL, SHOT_NOISE, HOT_PIXEL
 """Kinds of noise events: their causes."""
 
 
-@kernel
+@inlined
 def _next_candidate(i, circuit, state):
     state[per_pixel.SHOT_DRAW, i] += 1
     wait = rng.exponential(circuit.seed, rng.SHOT_TIME, i, state[per_pixel.SHOT_DRAW, i])
@@ -30,7 +30,7 @@ def hot_rate_of(i, seed, rate, spread):
     return rate * math.exp(spread * rng.normal(seed, rng.HOT_RATE, i, 0))
 
 
-@kernel
+@inlined
 def _next_hot(i, circuit, state):
     state[per_pixel.HOT_DRAW, i] += 1
     wait = rng.exponential(circuit.seed, rng.HOT_TIME, i, state[per_pixel.HOT_DRAW, i])
@@ -49,7 +49,7 @@ def next_noise(i, circuit, state):
     return kind, t
 
 
-@kernel
+@inlined
 def noise_within(i, now, t_end, circuit, state):
     """Kind and time of the next noise event of pixel i in [now, t_end); those before are lost."""
     if circuit.shot_rate > 0.0:
@@ -64,7 +64,7 @@ def noise_within(i, now, t_end, circuit, state):
     return kind, t
 
 
-@kernel
+@inlined
 def take_noise(i, kind, light, circuit, state):
     """Return the polarity of the present noise event of pixel i, and go on to the next one.
 

@@ -17,7 +17,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from adv2e.compiled import kernel
+from adv2e.compiled import inlined, kernel
 from adv2e.kernel import special
 
 # Streams: one for each kind of draw; never renumber, or old seeds give other events.
@@ -65,7 +65,7 @@ def _round(c0, c1, c2, c3, k0, k1):
     return (p1 >> _32) ^ c1 ^ k0, p1 & _LOW, (p0 >> _32) ^ c3 ^ k1, p0 & _LOW
 
 
-@kernel
+@inlined
 def philox_7(c0, c1, c2, c3, k0, k1):
     """Philox4x32-7, the fewest rounds that pass BigCrush (Salmon et al.), as :func:`philox`."""
     c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1)
@@ -77,7 +77,7 @@ def philox_7(c0, c1, c2, c3, k0, k1):
     return _round(c0, c1, c2, c3, k0 + _W0 * _6 & _LOW, k1 + _W1 * _6 & _LOW)
 
 
-@kernel
+@inlined
 def philox(c0, c1, c2, c3, k0, k1):
     """Philox4x32-10: four 32-bit words (in uint64) from a counter and a key of 32-bit words.
 

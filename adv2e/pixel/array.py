@@ -195,7 +195,7 @@ class PixelArray:
         noise = noise_of(circuit, self._level, LONGEST_US) if circuit.noise_rms > 0.0 else None
         factors = drift_factors((starts - self._start) * 1e-6, self._drift_per_s)
         plan = plan_for(lengths, fastest, circuit.follower, factors, simple, noise)
-        return [(rules_for(lengths[:0], fastest, 0.0), plan)]
+        return [(None, plan)]
 
     def _by_tiles(
         self, arguments: tuple[Any, ...], t_base: int, per_us: float,

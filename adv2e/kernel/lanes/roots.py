@@ -16,7 +16,7 @@ from there: over so short a time fewer nodes do.
 
 from __future__ import annotations
 
-from adv2e.compiled import kernel
+from adv2e.compiled import inlined, kernel
 from adv2e.kernel import screen, special
 from adv2e.kernel.comparator import TIE
 from adv2e.kernel.lanes import rows
@@ -62,7 +62,7 @@ def guess(lanes, count, length, circuit):
         lanes[rows.PLACE + k] = s + w * t if fresh else place
 
 
-@kernel
+@inlined
 def _light_after(i0, d, on_log, slope):
     """Light once x has moved by d, its mean until then, and z of the quadrature."""
     grown = i0 * special.exp(d)
@@ -72,7 +72,7 @@ def _light_after(i0, d, on_log, slope):
     return light, mean, z
 
 
-@kernel
+@inlined
 def _exponent(light, span, d, z, on_log, dark, per_dn, slope):
     """Parameters of the quadrature over `span`: a1, kappa, z, and how far back it reaches."""
     a = (dark + per_dn * light) * span
@@ -83,7 +83,7 @@ def _exponent(light, span, d, z, on_log, dark, per_dn, slope):
     return a * v, d * span * per_dn * moving * v * v, z * v, v
 
 
-@kernel
+@inlined
 def _set_up(began, light_began, lanes, count, dark, per_dn, slope):
     """Light and its integral at each place, and the parameters of the quadrature."""
     for k in range(count):
@@ -112,7 +112,7 @@ def _node(lanes, count, node, weight):
         lanes[rows.TOTAL + k] += weight * special.exp(-t)
 
 
-@kernel
+@inlined
 def _evaluate_from(
     began, light_began, lag_began, lanes, count, length, circuit, nodes, weights
 ):  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from adv2e.compiled import kernel
+from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.comparator import TIE, cause_by_leak, fire, note_reset
@@ -108,7 +108,7 @@ def note_releases(lo, count, pixels, state, lanes):
             state[per_pixel.RESET, i] = lanes[rows.REFERENCE + j] - lanes[rows.FALLEN_S + j]
 
 
-@kernel
+@inlined
 def fire_lane(i, j, when, polarity, cause, circuit, state, lanes, buffer, n):
     """Write an event of pixel i at the place of its lane j; returns the number of events."""
     before = state[per_pixel.LEAK_FACTOR, i]
@@ -118,7 +118,7 @@ def fire_lane(i, j, when, polarity, cause, circuit, state, lanes, buffer, n):
     return n
 
 
-@kernel
+@inlined
 def _change_leak(j, share, lanes):
     """Change the leak speed to `share` of the one before; the fall until place S stays."""
     lanes[rows.FALL + j] *= share
@@ -199,7 +199,7 @@ def _moves_before_turn(j, length, circuit, lanes):
     return dx * min(meet, 1.0) - lag
 
 
-@kernel
+@inlined
 def _choose(j, length, circuit, lanes):
     """Return the first target between S and STOP: a threshold, TURN, DONE (none), or HALF."""
     on, off = lanes[rows.ON + j] + TIE, lanes[rows.OFF + j] + TIE
@@ -236,7 +236,7 @@ def _choose(j, length, circuit, lanes):
     return by_end
 
 
-@kernel
+@inlined
 def found_stop(i, j, circuit, state, lanes):
     """Make the place that was evaluated (extremum, half-way or noise event) the next STOP."""
     seeks = lanes[rows.SEEKS + j]
@@ -253,7 +253,7 @@ def found_stop(i, j, circuit, state, lanes):
     lanes[rows.SEEKS + j] = rows.DOUBTFUL
 
 
-@kernel
+@inlined
 def _find_stop(i, j, interval, circuit, state, lanes):
     """Set STOP to the end of the piece; returns whether a noise event comes before it."""
     ta, length = interval.start, interval.length
@@ -271,7 +271,7 @@ def _find_stop(i, j, interval, circuit, state, lanes):
     return False
 
 
-@kernel
+@inlined
 def _pass_stop(i, j, interval, circuit, state, lanes, buffer, n):
     """Move to STOP, before which there is no crossing, and fire a noise event that is due there.
 
@@ -298,7 +298,7 @@ def _pass_stop(i, j, interval, circuit, state, lanes, buffer, n):
     return n, True
 
 
-@kernel
+@inlined
 def go_on(i, j, interval, circuit, state, lanes, buffer, n):
     """Choose the next target of a DOUBTFUL lane.  Returns the number of events."""
     ta, length = interval.start, interval.length

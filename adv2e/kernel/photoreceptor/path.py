@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import kernel
+from adv2e.compiled import inlined, kernel
 from adv2e.kernel import rng
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.photoreceptor import law, strip
@@ -70,7 +70,7 @@ def new_path() -> NoisePath:
     )  # fmt: skip
 
 
-@kernel
+@inlined
 def grid(path):
     """Return the samples of the piece, and the levels: 2^levels cells are between two samples."""
     return path.numbers[_SAMPLES], path.numbers[_LEVELS]

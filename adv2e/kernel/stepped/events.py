@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.causes import OWN_EFFECT
-from adv2e.compiled import kernel
+from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.comparator import TIE, cause_by_most, fire, note_parts
@@ -197,7 +197,7 @@ def first_reach(p0, p1, p2, p3, start, end):
     return _NOWHERE
 
 
-@kernel
+@inlined
 def _due_within(i, now, t_end, circuit, injected, state):
     """Kind and time of what happens to pixel i by itself in [now, t_end); earlier ones are lost."""
     kind, t = noise_within(i, now, t_end, circuit, state)
@@ -209,7 +209,7 @@ def _due_within(i, now, t_end, circuit, injected, state):
     return kind, t
 
 
-@kernel
+@inlined
 def _take_due(i, kind, light, circuit, injected, state):
     """Polarity of what happens to pixel i by itself, 0 where it is nothing; goes on to the next."""
     if kind == INJECTED:
