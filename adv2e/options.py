@@ -197,7 +197,44 @@ class EventOrder(TypedDict, total=False):
     ]
 
 
-class EventInput(AnyInput, EventOrder, total=False):
+StartS = Annotated[
+    "float | None",
+    Option(
+        help="Begin S seconds after the first frame, or event.",
+        flags=("--start",),
+        kind="seconds",
+        metavar="S",
+    ),
+]
+
+StopS = Annotated[
+    "float | None",
+    Option(
+        help="Stop S seconds after the first frame, or event.",
+        flags=("--stop",),
+        kind="seconds",
+        metavar="S",
+    ),
+]
+
+
+class Part(TypedDict, total=False):
+    """Options that choose a part of an input."""
+
+    start_s: StartS
+    stop_s: StopS
+    crop: Annotated[
+        "str | tuple[int, int, int, int] | None",
+        Option(
+            help="Take a part of each frame or sensor only, before anything else: first column,"
+            " first row, columns, rows.",
+            kind="rectangle",
+            metavar="X,Y,W,H",
+        ),
+    ]
+
+
+class EventInput(AnyInput, EventOrder, Part, total=False):
     """Options of the reading of events."""
 
     crop_events: Annotated[
@@ -254,43 +291,6 @@ class FrameInput(AnyFrames, total=False):
             help="Raw video comes through standard input (the input is -), in frames of the --size"
             " given.",
             choices=PIXEL_FORMATS,
-        ),
-    ]
-
-
-StartS = Annotated[
-    "float | None",
-    Option(
-        help="Begin S seconds after the first frame, or event.",
-        flags=("--start",),
-        kind="seconds",
-        metavar="S",
-    ),
-]
-
-StopS = Annotated[
-    "float | None",
-    Option(
-        help="Stop S seconds after the first frame, or event.",
-        flags=("--stop",),
-        kind="seconds",
-        metavar="S",
-    ),
-]
-
-
-class Part(TypedDict, total=False):
-    """Options that choose a part of an input."""
-
-    start_s: StartS
-    stop_s: StopS
-    crop: Annotated[
-        "str | tuple[int, int, int, int] | None",
-        Option(
-            help="Take a part of each frame or sensor only, before anything else: first column,"
-            " first row, columns, rows.",
-            kind="rectangle",
-            metavar="X,Y,W,H",
         ),
     ]
 
@@ -416,11 +416,11 @@ class Run(TypedDict, total=False):
     progress: Progress
 
 
-class CopyOptions(EventInput, Part, Clock, OutputOptions, Run, total=False):
+class CopyOptions(EventInput, Clock, OutputOptions, Run, total=False):
     """Options of the writing of events in another format."""
 
 
-class InfoOptions(FrameInput, EventOrder, total=False):
+class InfoOptions(FrameInput, EventOrder, Part, total=False):
     """Options of the description of an input."""
 
 
@@ -439,7 +439,7 @@ class ConvertOptions(SourceOptions, EventInput, SimulatedOutput, Run, total=Fals
     ]
 
 
-class DiagnoseOptions(EventInput, Part, Run, total=False):
+class DiagnoseOptions(EventInput, Run, total=False):
     """Options of a diagnosis."""
 
     light: Annotated[

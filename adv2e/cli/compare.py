@@ -91,7 +91,9 @@ def command(
         ours = read_events(measured, progress=told, **given)
     with reading_told(simulated, progress) as told:
         theirs = read_events(
-            simulated, progress=told, **{**given, "rotate180": False, "track": None}
+            simulated,
+            progress=told,
+            **{**given, "rotate180": False, "track": None, "start_s": None, "stop_s": None},
         )
     source = open_frames(frames_path, rotate180=given["rotate180"]) if frames_path else None
     for doubt in source.doubts if source else []:
