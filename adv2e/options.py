@@ -401,18 +401,21 @@ class SimulatedOutput(OutputOptions, total=False):
 Progress = Annotated[bool, Option(help="Show a progress bar on stderr.", default=False)]
 
 
+Threads = Annotated[
+    "int | None",
+    Option(
+        help="Compute with N threads. The result is the same for any N.",
+        usual="all cores that this process may use",
+        kind="count",
+        metavar="N",
+    ),
+]
+
+
 class Run(TypedDict, total=False):
     """Options of any work."""
 
-    threads: Annotated[
-        "int | None",
-        Option(
-            help="Compute with N threads. The result is the same for any N.",
-            usual="all cores that this process may use",
-            kind="count",
-            metavar="N",
-        ),
-    ]
+    threads: Threads
     progress: Progress
 
 
@@ -422,6 +425,32 @@ class CopyOptions(EventInput, Clock, OutputOptions, Run, total=False):
 
 class InfoOptions(FrameInput, EventOrder, Part, total=False):
     """Options of the description of an input."""
+
+
+class CompareOptions(EventInput, total=False):
+    """Options of a comparison of two streams of events."""
+
+    window_s: Annotated[
+        "float | None",
+        Option(
+            help="Compare in windows of S seconds.",
+            usual="from frame to frame; 0.05 if MEASURED has no frames",
+            flags=("--window",),
+            kind="positive",
+            metavar="S",
+        ),
+    ]
+    frames: Annotated[
+        "str | Path | None",
+        Option(
+            help="Take the frames from INPUT, on the clock of MEASURED. They set the windows, and"
+            " are what is simulated.",
+            usual="the frames in MEASURED",
+            metavar="INPUT",
+            completes="files",
+        ),
+    ]
+    threads: Threads
 
 
 class ConvertOptions(SourceOptions, EventInput, SimulatedOutput, Run, total=False):

@@ -194,6 +194,7 @@ COMPARE = {
     "window": [NO, ("--window", "0.02")],
     "frames": [NO, ("--frames", "listed")],
     "model": [NO, ("--seed", "4"), ("--set", "pixel.leak=null"), OWN_SENSOR],
+    **PART,
     "turn": TURN,
     "back": SET_BACK,
     "outside": [NO, ("--crop-events",)],
