@@ -224,11 +224,15 @@ def _opened(
 ) -> tuple[Recording, Recording, Source | None]:
     """Return both streams, and the frames from elsewhere if there are any."""
     given, frames = chosen(EventInput, options), options["frames"]
-    if not any(isinstance(one, (str, Path)) for one in (measured, simulated, frames)):
-        for name in (name for name, value in given.items() if value):
-            raise UsageError(f"{name}: is of the reading of a file: leave it out")
     whole: EventInput = {"rotate180": False, "track": None, "start_s": None, "stop_s": None}
     of_frames: Any = {name: given[name] for name in ("rotate180", "time_unit", "crop")}
+    of_files = {
+        *(() if isinstance(measured, Recording) else given),
+        *(() if isinstance(simulated, Recording) else given.keys() - whole.keys()),
+        *(() if frames is None else of_frames),
+    }
+    for name in (name for name, value in given.items() if value and name not in of_files):
+        raise UsageError(f"{name}: is of the reading of a file: leave it out")
     return (
         _read(measured, given, reading),
         _read(simulated, {**given, **whole}, reading),
@@ -237,7 +241,7 @@ def _opened(
 
 
 def _read(stream: str | Path | Recording, given: EventInput, reading: Reading) -> Recording:
-    if not isinstance(stream, (str, Path)):
+    if isinstance(stream, Recording):
         return stream
     with reading(stream) as progress:
         return read_events(stream, progress=progress, **given)

@@ -109,9 +109,7 @@ def convert_events(
                     causes=causes,
                 )
             )
-            stored = 0
-            if sink.wants_frames:
-                stored = _write_frames(file, Size(*size), origin_us, sink, keeps_all_bits)
+            stored = _write_frames(file, Size(*size), origin_us, sink, keeps_all_bits)
             events = on = first = last = 0
             for chunk in parts:
                 chunk["t"] -= origin_us
@@ -138,9 +136,9 @@ def convert_events(
 def _write_frames(
     file: EventFile, size: Size, origin_us: int, sink: Sink, keeps_all_bits: bool
 ) -> int:
-    """Write the frames, their times counted from an origin; return how many."""
+    """Write the frames, if any are wanted, their times counted from an origin; return how many."""
     count = 0
-    for shot in shots_of(file):
+    for shot in shots_of(file) if sink.wants_frames else ():
         picture = stored_picture(shot.load(), file.facts.light, keeps_all_bits)
         rows, columns = picture.shape[:2]
         if columns < size.width or rows < size.height:

@@ -294,7 +294,8 @@ class Survey:
         """Return first and last time of the events [us], of the frames where there are none."""
         if self.count:
             return self._columns["t"].least, self._columns["t"].most
-        shots = [] if self._file.shots is None else list(self._file.shots())
+        with _reading(self._facts.path):
+            shots = [] if self._file.shots is None else list(self._file.shots())
         return (microseconds(shots[0].t_ns), microseconds(shots[-1].t_ns)) if shots else (0, 0)
 
     def tell_order(self) -> None:
@@ -553,6 +554,8 @@ def _wanted(file: EventFile, parts: Iterable[Events]) -> Generator[Events, None,
             some["x"] -= x
             some["y"] -= y
             some = inside(some, (width, height))
+        elif some.size < events.size:
+            some = some.copy()  # without the rest in memory
         if some.size:
             found = True
             yield some

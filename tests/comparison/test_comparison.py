@@ -2,8 +2,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,29 +14,18 @@ from adv2e.comparison.report import text
 from adv2e.comparison.windows import Windows
 from adv2e.errors import DataError, UsageError
 from adv2e.events import empty_events
-
-
-@dataclass(frozen=True)
-class Stream:
-    path: str
-    events: Any
-    frame_times_ns: Any = None
-    layout: str = "monash"
-    width: int = 12
-    height: int = 9
-    problems: tuple[str, ...] = ()
-    frames: Any = None
-    encoding: str = "linear"
+from adv2e.formats.recording import Recording
 
 
 @pytest.fixture
 def measured(random_events):
-    return Stream("real.zip", random_events(1, 3000), np.arange(0, 120_000_000, 20_000_000))
+    times_ns = np.arange(0, 120_000_000, 20_000_000)
+    return Recording("real.zip", "monash", 12, 9, random_events(1, 3000), times_ns)
 
 
 @pytest.fixture
 def simulated(random_events):
-    return Stream("made.h5", random_events(2, 2500))
+    return Recording("made.h5", "monash", 12, 9, random_events(2, 2500))
 
 
 def test_the_windows_are_the_frame_intervals_of_the_measured_recording(measured, simulated):
@@ -120,6 +108,8 @@ def test_a_configuration_gives_the_floor_of_two_seeds(
 def test_how_to_read_is_said_of_files_alone(measured, simulated):
     with pytest.raises(UsageError, match="crop: is of the reading of a file"):
         compare(measured, simulated, crop=(0, 0, 2, 2))
+    with pytest.raises(UsageError, match="start_s: is of the reading of a file"):
+        compare(measured, "made.h5", start_s=0.1, crop=(0, 0, 2, 2))
 
 
 def test_the_report_is_plain_json(measured, simulated):
