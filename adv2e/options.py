@@ -216,7 +216,7 @@ class EventOrder(TypedDict, total=False):
 StartS = Annotated[
     "float | None",
     Option(
-        help="Begin S seconds after the first frame, or event.",
+        help="Begin S seconds after the first frame; where events are read, after the first event.",
         flags=("--start",),
         kind="seconds",
         metavar="S",
@@ -226,7 +226,7 @@ StartS = Annotated[
 StopS = Annotated[
     "float | None",
     Option(
-        help="Stop S seconds after the first frame, or event.",
+        help="Stop S seconds after the same.",
         flags=("--stop",),
         kind="seconds",
         metavar="S",

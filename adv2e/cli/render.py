@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     default=None,
     help="Show the frames to the left of the events.  [default: if there are frames]",
 )
-@options.declared_options(RenderOptions)
+@options.declared_options(RenderOptions, help={"start_s": "Here, whichever is earlier."})
 def command(
     events: str,
     output: str | None,

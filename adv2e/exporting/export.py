@@ -25,16 +25,7 @@ from adv2e.files.regular import shown
 from adv2e.files.staging import Staging, writing
 from adv2e.formats.reading import events_in_order
 from adv2e.in_python import in_python
-from adv2e.options import (
-    EXPORTS,
-    MOST_EMPTY,
-    EventInput,
-    ExportOptions,
-    Part,
-    chosen,
-    declared,
-    takes,
-)
+from adv2e.options import EXPORTS, MOST_EMPTY, EventInput, ExportOptions, chosen, declared, takes
 
 DESCRIPTION = "export.json"
 """Name of the file that describes an export."""
@@ -307,7 +298,8 @@ def _exported(
             {"name": sequence.name, "file": shown(sequence.file.facts.path.name)}
             for sequence in sequences
         ]
-        part = {name: reading[name] for name in declared(Part) if reading.get(name) is not None}
+        asked = {name: reading.get(name) for name in ("start_s", "stop_s", "crop")}
+        part = {name: value for name, value in asked.items() if value is not None}
         described |= {"part": part} if part else {}
         text = {"adv2e": __version__, **described, "inputs": inputs, **told, "entries": entries}
         (folder / DESCRIPTION).write_text(json.dumps(text, indent=2) + "\n", "utf-8", newline="\n")
