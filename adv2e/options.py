@@ -19,6 +19,7 @@ import re
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from numbers import Real
 from typing import (
     TYPE_CHECKING,
     Annotated,
@@ -62,10 +63,19 @@ SET_BACK = ("continue", "sort")
 """Readings of events whose times go back."""
 
 
-def _seconds(value: float) -> float:
-    if not (value >= 0 and math.isfinite(value)):
-        raise ValueError(f"must be seconds from the first frame, got {value:g}")
-    return value
+MOST_SHARE = 0.9
+"""Largest share of what is kept for validation."""
+
+
+def _number(what: str, fits: Callable[[Any], bool]) -> Callable[[Any], Any]:
+    """Return a check of numbers that are finite and fit, which `what` says in words."""
+
+    def checked(value: Any) -> Any:
+        if not (isinstance(value, Real) and math.isfinite(value) and fits(value)):
+            raise ValueError(f"must be {what}, got {value!r}")
+        return value
+
+    return checked
 
 
 def _count(value: int) -> int:
@@ -77,7 +87,10 @@ def _count(value: int) -> int:
 _CHECKS: dict[str, Callable[[Any], Any]] = {
     "size": parse_size,
     "rectangle": parse_rectangle,
-    "seconds": _seconds,
+    "seconds": _number("seconds from the first frame", lambda value: value >= 0),
+    "positive": _number("a number above 0", lambda value: value > 0),
+    "share": _number(f"a share from 0 to {MOST_SHARE}", lambda value: 0 <= value <= MOST_SHARE),
+    "time": _count,
     "count": _count,
 }
 
@@ -104,7 +117,7 @@ class Option:
     metavar : str
         Value in the help of the command line.
     most : int, optional
-        Largest value of a count.
+        Largest value of a number.
     completes : str
         Names that a shell completes: of files, formats, or layouts.
     """
@@ -137,9 +150,12 @@ class Option:
             if self.choices and value not in self.choices:
                 *first, last = self.choices
                 raise ValueError(f"must be {', '.join(first)} or {last}, got {value!r}")
-            return _CHECKS[self.kind](value) if self.kind in _CHECKS else value
+            found = _CHECKS[self.kind](value) if self.kind in _CHECKS else value
+            if self.most is not None and found > self.most:
+                raise ValueError(f"must be at most {self.most}, got {value!r}")
+            return found
         except (ValueError, TypeError) as error:
-            raise UsageError(f"{self.flag_of(name)}: {error}") from None
+            raise UsageError(f"{name}: {error}") from None
 
 
 class AnyInput(TypedDict, total=False):
@@ -197,7 +213,44 @@ class EventOrder(TypedDict, total=False):
     ]
 
 
-class EventInput(AnyInput, EventOrder, total=False):
+StartS = Annotated[
+    "float | None",
+    Option(
+        help="Begin S seconds after the first frame; where events are read, after the first event.",
+        flags=("--start",),
+        kind="seconds",
+        metavar="S",
+    ),
+]
+
+StopS = Annotated[
+    "float | None",
+    Option(
+        help="Stop S seconds after the same.",
+        flags=("--stop",),
+        kind="seconds",
+        metavar="S",
+    ),
+]
+
+
+class Part(TypedDict, total=False):
+    """Options that choose a part of an input."""
+
+    start_s: StartS
+    stop_s: StopS
+    crop: Annotated[
+        "str | tuple[int, int, int, int] | None",
+        Option(
+            help="Take a part of each frame or sensor only, before anything else: first column,"
+            " first row, columns, rows.",
+            kind="rectangle",
+            metavar="X,Y,W,H",
+        ),
+    ]
+
+
+class EventInput(AnyInput, EventOrder, Part, total=False):
     """Options of the reading of events."""
 
     crop_events: Annotated[
@@ -258,43 +311,6 @@ class FrameInput(AnyFrames, total=False):
     ]
 
 
-StartS = Annotated[
-    "float | None",
-    Option(
-        help="Begin S seconds after the first frame, or event.",
-        flags=("--start",),
-        kind="seconds",
-        metavar="S",
-    ),
-]
-
-StopS = Annotated[
-    "float | None",
-    Option(
-        help="Stop S seconds after the first frame, or event.",
-        flags=("--stop",),
-        kind="seconds",
-        metavar="S",
-    ),
-]
-
-
-class Part(TypedDict, total=False):
-    """Options that choose a part of an input."""
-
-    start_s: StartS
-    stop_s: StopS
-    crop: Annotated[
-        "str | tuple[int, int, int, int] | None",
-        Option(
-            help="Take a part of each frame or sensor only, before anything else: first column,"
-            " first row, columns, rows.",
-            kind="rectangle",
-            metavar="X,Y,W,H",
-        ),
-    ]
-
-
 class Clock(TypedDict, total=False):
     """Option of the clock of what is made."""
 
@@ -327,6 +343,7 @@ class SourceOptions(FrameInput, Part, Clock, total=False):
             usual="6, 8 or 32",
             flags=("--extent",),
             kind="positive",
+            most=1_000_000,
             metavar="PX",
         ),
     ]
@@ -337,6 +354,7 @@ class SourceOptions(FrameInput, Part, Clock, total=False):
             usual="0.3, 1 or 1",
             flags=("--duration",),
             kind="positive",
+            most=1_000_000,
             metavar="S",
         ),
     ]
@@ -401,27 +419,56 @@ class SimulatedOutput(OutputOptions, total=False):
 Progress = Annotated[bool, Option(help="Show a progress bar on stderr.", default=False)]
 
 
+Threads = Annotated[
+    "int | None",
+    Option(
+        help="Compute with N threads. The result is the same for any N.",
+        usual="all cores that this process may use",
+        kind="count",
+        metavar="N",
+    ),
+]
+
+
 class Run(TypedDict, total=False):
     """Options of any work."""
 
-    threads: Annotated[
-        "int | None",
-        Option(
-            help="Compute with N threads. The result is the same for any N.",
-            usual="all cores that this process may use",
-            kind="count",
-            metavar="N",
-        ),
-    ]
+    threads: Threads
     progress: Progress
 
 
-class CopyOptions(EventInput, Part, Clock, OutputOptions, Run, total=False):
+class CopyOptions(EventInput, Clock, OutputOptions, Run, total=False):
     """Options of the writing of events in another format."""
 
 
-class InfoOptions(FrameInput, EventOrder, total=False):
+class InfoOptions(FrameInput, EventOrder, Part, total=False):
     """Options of the description of an input."""
+
+
+class CompareOptions(EventInput, total=False):
+    """Options of a comparison of two streams of events."""
+
+    window_s: Annotated[
+        "float | None",
+        Option(
+            help="Compare in windows of S seconds.",
+            usual="from frame to frame; 0.05 if MEASURED has no frames",
+            flags=("--window",),
+            kind="positive",
+            metavar="S",
+        ),
+    ]
+    frames: Annotated[
+        "str | Path | None",
+        Option(
+            help="Take the frames from INPUT, on the clock of MEASURED. They set the windows, and"
+            " are what is simulated.",
+            usual="the frames in MEASURED",
+            metavar="INPUT",
+            completes="files",
+        ),
+    ]
+    threads: Threads
 
 
 class ConvertOptions(SourceOptions, EventInput, SimulatedOutput, Run, total=False):
@@ -439,7 +486,7 @@ class ConvertOptions(SourceOptions, EventInput, SimulatedOutput, Run, total=Fals
     ]
 
 
-class DiagnoseOptions(EventInput, Part, Run, total=False):
+class DiagnoseOptions(EventInput, Run, total=False):
     """Options of a diagnosis."""
 
     light: Annotated[
@@ -574,10 +621,18 @@ WindowUs = Annotated[
     Option(
         help="Cut the events into windows of TIME, such as 33ms. For ev-segnet: the time before"
         " each image.",
-        usual="ev-segnet: 50ms",
+        usual="ev-segnet: 50ms; voxel in a batch: from image to image",
         flags=("--window",),
         kind="time",
         metavar="TIME",
+    ),
+]
+
+
+Bins = Annotated[
+    int,
+    Option(
+        help="Temporal bins of a voxel grid.", default=5, kind="count", most=10_000, metavar="N"
     ),
 ]
 
@@ -601,16 +656,7 @@ class VoxelOptions(TypedDict, total=False):
             metavar="N",
         ),
     ]
-    bins: Annotated[
-        int,
-        Option(
-            help="Temporal bins of a voxel grid.",
-            default=5,
-            kind="count",
-            most=10_000,
-            metavar="N",
-        ),
-    ]
+    bins: Bins
     normalise: Annotated[
         str,
         Option(
@@ -715,27 +761,8 @@ class BatchOptions(AnyFrames, Part, Clock, Content, Run, total=False):
             choices=tuple(EXPORTS),
         ),
     ]
-    window_us: Annotated[
-        "int | None",
-        Option(
-            help="Of --export voxel: windows of TIME, such as 33ms. Of --export ev-segnet: the time"
-            " before each image.",
-            usual="from image to image; ev-segnet: 50ms",
-            flags=("--window",),
-            kind="time",
-            metavar="TIME",
-        ),
-    ]
-    bins: Annotated[
-        "int | None",
-        Option(
-            help="Of --export voxel: temporal bins of a grid.",
-            usual="5",
-            kind="count",
-            most=10_000,
-            metavar="N",
-        ),
-    ]
+    window_us: WindowUs
+    bins: Bins
     jobs: Annotated[
         "int | None",
         Option(

@@ -415,11 +415,11 @@ def _export(options: BatchOptions, format: Format) -> Export | None:
     kind, window_us, bins = options["export"], options["window_us"], options["bins"]
     if window_us is not None and kind not in ("voxel", "ev-segnet"):
         raise UsageError("--window is for --export voxel and --export ev-segnet")
-    if bins is not None and kind != "voxel":
+    if bins != Export.bins and kind != "voxel":
         raise UsageError("--bins is for --export voxel")
     if kind is None:
         return None
-    export = Export(kind, window_us, bins or 5)
+    export = Export(kind, window_us, bins)
     if export.needs_frames and "w" not in format.frames:
         raise UsageError(
             f"--export {kind} needs frames, and {format.what} holds events alone: leave out"

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @options.config_options
 @options.output_options
 @options.reporting_options
-@options.declared_options(DiagnoseOptions)
+@options.declared_options(DiagnoseOptions, help={"start_s": "Here, the first frame."})
 def command(
     recording: str,
     config: Callable[[Size | None], Config],

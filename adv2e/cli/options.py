@@ -23,7 +23,7 @@ from adv2e.cli.exit_status import VERBOSITY
 from adv2e.cli.progress import compilation_told
 from adv2e.files.regular import shown
 from adv2e.geometry import parse_rectangle, parse_size
-from adv2e.options import BAYER, Option, OutputOptions, Run, declared
+from adv2e.options import BAYER, MOST_SHARE, Option, OutputOptions, Run, declared
 
 if TYPE_CHECKING:
     from adv2e.config import Config
@@ -244,8 +244,7 @@ _TYPES: dict[str, Any] = {
     "size": SIZE,
     "rectangle": RECTANGLE,
     "seconds": SECONDS,
-    "positive": POSITIVE,
-    "share": FiniteNumber(0, 0.9),
+    "share": FiniteNumber(0, MOST_SHARE),
     "time": TIME,
 }
 """Types of Click by kind of option; the others are text."""
@@ -287,6 +286,8 @@ def _click_option(name: str, option: Option, help: str = "") -> Callable[[Body],
         about["type"] = click.Choice(option.choices, case_sensitive=option.choices != BAYER)
     elif option.kind == "count":
         about["type"] = WholeNumber(1, option.most)
+    elif option.kind == "positive":
+        about["type"] = FiniteNumber(0, option.most, min_open=True)
     elif option.kind in _TYPES:
         about["type"] = _TYPES[option.kind]
     elif option.kind == "rate":

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     default=None,
     help="Show the frames to the left of the events.  [default: if there are frames]",
 )
-@options.declared_options(RenderOptions)
+@options.declared_options(RenderOptions, help={"start_s": "Here, whichever is earlier."})
 def command(
     events: str,
     output: str | None,
@@ -57,13 +57,13 @@ def command(
         raise click.UsageError("-o is missing: a .mp4, .webm, .avi, .gif or .png file")
     check_together(given)
     from adv2e.formats.reading import read_events
-    from adv2e.options import EventInput, RenderedPart, chosen
+    from adv2e.options import RenderedPart, chosen
     from adv2e.rendering import render_recording
-    from adv2e.rendering.render import chosen_style
+    from adv2e.rendering.render import chosen_style, reading_of
 
     style = chosen_style(output, given)
     with reading_told(events, progress) as told:
-        recording = read_events(events, progress=told, **chosen(EventInput, given))
+        recording = read_events(events, progress=told, **reading_of(given))
     for problem in recording.problems:
         log(f"{events}: {problem}")
     if frames and recording.frame_times_ns is None:

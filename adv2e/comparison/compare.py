@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +23,25 @@ from adv2e.comparison.distances import (
 from adv2e.comparison.floor import Floor, half_split
 from adv2e.comparison.offset import latency_offset_us
 from adv2e.comparison.windows import Windows, fixed_windows, frame_windows, span_of
-from adv2e.errors import DataError
+from adv2e.errors import DataError, UsageError, warn
 from adv2e.events import Events, Window, cut
+from adv2e.formats.event_file import Progress
+from adv2e.formats.frames import open_frames
 from adv2e.formats.reading import read_events
 from adv2e.formats.recording import Recording
+from adv2e.in_python import in_python
+from adv2e.light.sensor import check_beside
+from adv2e.options import CompareOptions, EventInput, chosen, takes
 from adv2e.sources.times.rates import seconds
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from adv2e.config import Written
+    from adv2e.sources import Source
+
+Reading = Callable[[str | Path], AbstractContextManager[Progress | None]]
+"""Returns, for a file, a context within which it is read, and what is told how far it is."""
 
 # ---- Statistics of one stream by itself: counts, rates, ON share, inter-event times.
 
@@ -110,21 +125,16 @@ TWO_SEEDS = (
 )
 
 
-@dataclass(frozen=True)
-class Resimulation:
-    """Simulation of the same frames by two seeds, for the noise floor."""
-
-    simulate_events: Callable[[int], Events]
-    seeds: tuple[int, int]
-
-
+@takes(CompareOptions)
 def compare(
     measured: str | Path | Recording,
     simulated: str | Path | Recording,
+    config: Written | Sequence[Written] | None = None,
     *,
     frame_times_ns: NDArray[np.int64] | None = None,
-    window_s: float | None = None,
-    again: Resimulation | None = None,
+    reading: Reading = lambda path: nullcontext(),
+    doubt: Callable[[str], None] = lambda text: warn(in_python(text)),
+    **options: Unpack[CompareOptions],
 ) -> dict[str, Any]:
     """Return all distances and statistics with their definitions and floors, ready for JSON.
 
@@ -132,19 +142,24 @@ def compare(
     ----------
     measured, simulated : str, Path or Recording
         Two recordings of one size on one clock: files, or what :func:`adv2e.read_events` returned.
+    config : Config, or what :func:`adv2e.load_config` takes, optional
+        With it the frames are simulated, by its seed and by the next one, for the floor of two
+        seeds.
     frame_times_ns : array of int64, optional
-        Times of the frames whose intervals are the windows [ns]; default: those of `measured`.
-    window_s : float, optional
-        Length of the windows [s], in place of frame intervals; default where there are no frames:
-        0.05.
-    again : Resimulation, optional
-        Gives the floor of two seeds.
+        Times of the frames whose intervals are the windows [ns]; default: those of the frames.
+    reading : Reading
+        Tells of files that are read.
+    doubt : callable
+        Takes lines for people that ask for a look; default: they are warnings.
+    **options
+        See :class:`adv2e.options.CompareOptions`.  How to read a file is for files alone:
+        `rotate180`, `track`, `start_s` and `stop_s` are of `measured`.
 
     Raises
     ------
     DataError
         Sizes differ, a stream is empty, or the streams have no whole window in common; a file
-        cannot be read.
+        cannot be read; there are no frames to simulate, or they have another size.
 
     Examples
     --------
@@ -157,9 +172,16 @@ def compare(
     >>> found["measures"]["relative_5_bins"]["value"] < 0.5
     True
     """
-    measured, simulated = map(_read, (measured, simulated))
-    spans = _spans(measured, simulated)
+    measured, simulated, source = _opened(measured, simulated, options, reading)
+    for line in source.doubts if source else ():
+        doubt(line)
     times = measured.frame_times_ns if frame_times_ns is None else frame_times_ns
+    if source is not None and frame_times_ns is None:
+        times = np.array([frame.t_ns for frame in source.frames()])
+    again = None
+    if config is not None:
+        again = _resimulation(measured, source, config, options["threads"])
+    spans, window_s = _spans(measured, simulated), options["window_s"]
     if window_s is None and times is not None and len(times) > 1:
         windows = frame_windows(times, spans)
     else:
@@ -169,8 +191,12 @@ def compare(
     found = distances(ours, theirs, windows, *kept)
     floors = {"half_split": half_split(ours, windows, *kept)}
     if again is not None:
-        one, other = map(again.simulate_events, again.seeds)
+        simulate_events, seeds = again
+        one, other = map(simulate_events, seeds)
         floors["two_seeds"] = distances(one, other, windows, *size, whole=measured.events).values
+    for stream in (measured, simulated):
+        for problem in stream.problems:
+            doubt(f"{stream.path}: {problem}")
     return {
         "measured": _stream(measured),
         "simulated": _stream(simulated),
@@ -184,14 +210,69 @@ def compare(
         "statistics": _statistics(measured, simulated, windows),
         "floors": {
             "half_split": HALF_SPLIT,
-            "two_seeds": None if again is None else TWO_SEEDS.format(*again.seeds),
+            "two_seeds": None if again is None else TWO_SEEDS.format(*seeds),
         },
         "warning": WARNING,
     }
 
 
-def _read(stream: str | Path | Recording) -> Recording:
-    return read_events(stream) if isinstance(stream, (str, Path)) else stream
+def _opened(
+    measured: str | Path | Recording,
+    simulated: str | Path | Recording,
+    options: CompareOptions,
+    reading: Reading,
+) -> tuple[Recording, Recording, Source | None]:
+    """Return both streams, and the frames from elsewhere if there are any."""
+    given, frames = chosen(EventInput, options), options["frames"]
+    whole: EventInput = {"rotate180": False, "track": None, "start_s": None, "stop_s": None}
+    of_frames: Any = {name: given[name] for name in ("rotate180", "time_unit", "crop")}
+    of_files = {
+        *(() if isinstance(measured, Recording) else given),
+        *(() if isinstance(simulated, Recording) else given.keys() - whole.keys()),
+        *(() if frames is None else of_frames),
+    }
+    for name in (name for name, value in given.items() if value and name not in of_files):
+        raise UsageError(f"{name}: is of the reading of a file: leave it out")
+    return (
+        _read(measured, given, reading),
+        _read(simulated, {**given, **whole}, reading),
+        None if frames is None else open_frames(frames, **of_frames),
+    )
+
+
+def _read(stream: str | Path | Recording, given: EventInput, reading: Reading) -> Recording:
+    if isinstance(stream, Recording):
+        return stream
+    with reading(stream) as progress:
+        return read_events(stream, progress=progress, **given)
+
+
+def _resimulation(
+    measured: Recording,
+    source: Source | None,
+    written: Written | Sequence[Written],
+    threads: int | None,
+) -> tuple[Callable[[int], Events], tuple[int, int]]:
+    """Return what simulates the frames of `source`, or of `measured`, by a seed; and two seeds."""
+    # all this is needed for a configuration alone
+    from adv2e.comparison.resimulation import resimulator  # noqa: PLC0415
+    from adv2e.config import load_config  # noqa: PLC0415
+    from adv2e.kernel.rng import LARGEST_SEED  # noqa: PLC0415
+
+    config, size = load_config(written), (measured.width, measured.height)
+    if source is not None:
+        frames, encoding = source.frames, source.encoding
+    elif measured.frame_times_ns is not None:
+        check_beside(*size, config.sensor, measured.path)
+        config = replace(config, sensor=None)
+        frames, encoding = measured.frames, measured.encoding
+    else:
+        raise DataError(
+            f"{measured.path}: holds no frames to simulate with this configuration; give them with"
+            " --frames"
+        )
+    simulate_events = resimulator(frames, config, encoding, size, threads=threads)
+    return simulate_events, (config.seed, (config.seed + 1) % (LARGEST_SEED + 1))
 
 
 def _spans(measured: Recording, simulated: Recording) -> list[Window]:

@@ -101,7 +101,9 @@ def diagnose_file(
     and then how far it is, where no bar does.
     """
     light, without, overwrite = options["light"], options["without"], options["overwrite"]
-    reading = chosen(EventInput, options)
+    # a part begins with what its pixels saw before
+    whole: EventInput = {"start_s": None, "stop_s": None, "crop": None}
+    reading: EventInput = {**chosen(EventInput, options), **whole}
     del reading["size"]  # that of the sensor is in the configuration
     check_names(without, names(declared))
     _check_own_names(declared)

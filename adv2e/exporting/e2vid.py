@@ -27,7 +27,7 @@ from adv2e.conversion.transfer import copied_metadata, stored_picture
 from adv2e.errors import DataError
 from adv2e.events import Events, cut
 from adv2e.exporting.sequence import Sequence
-from adv2e.formats.reading import events_in_order
+from adv2e.formats.reading import events_in_order, shots_of
 from adv2e.formats.writing import open_sink
 
 USUAL_FRAMES = 42
@@ -130,8 +130,7 @@ def images_of(
 ) -> Iterator[tuple[int, NDArray[Any]]]:
     """Yield time [ns] and picture, grey and of 8 bits, of each image between two times."""
     file, times = sequence.file, sequence.image_times_us
-    assert file.shots is not None
-    for t_us, shot in zip(times, file.shots(), strict=True):
+    for t_us, shot in zip(times, shots_of(file), strict=True):
         if not begin_us <= t_us <= end_us:
             continue
         yield shot.t_ns, grey(stored_picture(shot.load(), file.facts.light, False))

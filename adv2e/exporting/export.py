@@ -298,6 +298,9 @@ def _exported(
             {"name": sequence.name, "file": shown(sequence.file.facts.path.name)}
             for sequence in sequences
         ]
+        asked = {name: reading.get(name) for name in ("start_s", "stop_s", "crop")}
+        part = {name: value for name, value in asked.items() if value is not None}
+        described |= {"part": part} if part else {}
         text = {"adv2e": __version__, **described, "inputs": inputs, **told, "entries": entries}
         (folder / DESCRIPTION).write_text(json.dumps(text, indent=2) + "\n", "utf-8", newline="\n")
     for sequence in sequences:

@@ -11,7 +11,7 @@ from typing import Any
 
 from adv2e.errors import DataError, UsageError
 from adv2e.formats.event_file import EventFile
-from adv2e.formats.reading import open_events
+from adv2e.formats.reading import open_events, shots_of
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Sequence:
         if self.file.shots is None:
             path = self.file.facts.path
             raise DataError(f"{path}: holds no images; 'adv2e convert --with-frames' stores them")
-        return [(shot.t_ns + 500) // 1000 for shot in self.file.shots()]
+        return [(shot.t_ns + 500) // 1000 for shot in shots_of(self.file)]
 
 
 def open_sequences(paths: Many[str | Path], **reading: Any) -> list[Sequence]:

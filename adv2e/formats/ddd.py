@@ -126,7 +126,7 @@ def open_exported(path: Path, facts: Facts) -> EventFile:
 
 def _tell_upside_down(facts: Facts) -> None:
     """Tell of the way in which the cameras were mounted, unless the user knows."""
-    if not facts.rotate180:
+    if not facts.selection.rotate180:
         facts.problems.append(_UPSIDE_DOWN)
 
 

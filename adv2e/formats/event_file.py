@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from adv2e.formats.clock import unwrapped
 from adv2e.formats.columns import event_unit, named_geometry
+from adv2e.sources.base import Selection
 from adv2e.sources.frame import Light, Shot, Track, choose
 from adv2e.sources.stored import recorded_light
 from adv2e.sources.times.rates import Unit
@@ -33,6 +34,8 @@ Columns = tuple[Column, Column, Column, Column]
 Progress = Callable[[int, int], None]
 """Is told how much of a file was read, and of how much: bytes, or events."""
 
+_WHOLE = Selection()
+
 
 class Facts:
     """Facts about an event file: those it states, those the user gives, and its problems.
@@ -45,10 +48,8 @@ class Facts:
         Unit of the times, as the user says.
     progress : callable, optional
         Is told how far the reading is.
-    rotate180 : bool
-        Events and frames will be turned by half a turn, as the user says.
-    track : str, optional
-        Which of several streams the user wants: its number or its name.
+    selection : Selection
+        The stream and the part of it that the user wants, and whether it is turned by half a turn.
     set_back : {'continue', 'sort'}, optional
         Treatment of times that go back; see :mod:`adv2e.formats.clock`.
     crop_events : bool
@@ -64,6 +65,9 @@ class Facts:
         The reader looked for the stream that the user wants.
     needs_unit : bool
         Neither the format nor the file says the unit of its times: that of the user counts.
+    span_us : (int, int) or None
+        First and last time of the events [us], of frames where there are none; None before all
+        were read.
     problems : list of str
         Doubts about the file, and how they were resolved.
     description : dict
@@ -84,16 +88,15 @@ class Facts:
         time_unit: str | None = None,
         progress: Progress | None = None,
         *,
-        rotate180: bool = False,
-        track: str | None = None,
+        selection: Selection = _WHOLE,
         set_back: str | None = None,
         crop_events: bool = False,
     ) -> None:
         self.path = path
-        self.track = track
+        self.selection = selection
         self.has_chosen = self.needs_unit = False
         self.inputs: list[str | Path] = []
-        self.rotate180 = rotate180
+        self.span_us: tuple[int, int] | None = None
         self.set_back = set_back
         self.crop_events = crop_events
         self.progress = progress or (lambda done, total: None)
@@ -144,7 +147,7 @@ class Facts:
         self, events: Sequence[Track], frames: Sequence[Track] = ()
     ) -> tuple[int | None, int | None]:
         """Return the streams to be read, as :func:`adv2e.sources.frame.choose` does."""
-        event, frame, told = choose(self.track, events, frames, self.path)
+        event, frame, told = choose(self.selection.track, events, frames, self.path)
         self.has_chosen = True
         self.problems += told
         return event, frame
@@ -235,8 +238,8 @@ class EventFile:
         Returns an iterator over all events, part by part in the order of the file; it raises
         DataError where they cannot be read, and may add problems to the facts.
     shots : callable, optional
-        Returns an iterator over the frames, in the order of time and not loaded; None: the file has
-        none.
+        Returns an iterator over all frames, in the order of time, not loaded and not turned (see
+        :func:`adv2e.formats.reading.shots_of`); None: the file has none.
     causes : callable, optional
         Returns the number of the cause of each event, in the order of the file; None: it has none.
     unit_ns, offset_us : int

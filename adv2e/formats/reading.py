@@ -4,11 +4,16 @@ Some facts are known only once all events of a file were read: the size of the s
 timestamps, and whether each column is what it is taken for.  Where the events need not all be kept
 (:func:`events_in_order`) the file is therefore read twice.  Events of one time keep the order of
 the file.
+
+The part that is wanted counts its times from the first event, or without any from the first frame;
+both ends belong to it, and its coordinates count from its corner.  Frames are cut with the events.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -36,12 +41,13 @@ from adv2e.formats.event_file import (
 )
 from adv2e.formats.recording import Recording
 from adv2e.formats.registry import format_of
-from adv2e.geometry import MOST_PIXELS
+from adv2e.geometry import MOST_PIXELS, Size
 from adv2e.options import EventInput, size_of, takes
 from adv2e.process.machine import machine_complaint
-from adv2e.sources.frame import Frame, Shot, Track, rotated180
+from adv2e.sources.base import Selection
+from adv2e.sources.frame import Frame, Shot, Track
 from adv2e.sources.times.rates import SETTLED, seconds
-from adv2e.ticks import check_us
+from adv2e.ticks import check_us, microseconds
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -68,13 +74,12 @@ def open_events(
         As :func:`read_events`.
     """
     path = Path(path)
-    time_unit, track = options["time_unit"], options["track"]
+    time_unit, selection = options["time_unit"], Selection.of(options)
     facts = Facts(
         path,
         time_unit,
         progress,
-        rotate180=options["rotate180"],
-        track=None if track is None else str(track),
+        selection=selection,
         set_back=options["set_back"],
         crop_events=options["crop_events"],
     )
@@ -94,12 +99,11 @@ def open_events(
             facts.tell(f"--time-unit {time_unit} is not followed: the file says what its times are")
         facts.inputs.append(beside_of_causes(path))
         inside = found.load(found.causes)(path) if found.causes else None
-    if options["rotate180"] and facts.geometry is None:
+    if selection.rotate180 and facts.geometry is None:
         raise DataError(
             f"{path}: states no size of its sensor, which --rotate180 needs to turn the events"
         )
-    shots = None if file.shots is None else partial(_shots, facts, file.shots)
-    return replace(file, causes=inside or found_beside(path), shots=shots)
+    return replace(file, causes=inside or found_beside(path))
 
 
 @takes(EventInput)
@@ -148,17 +152,22 @@ def read_events(
     return recording
 
 
-def _shots(facts: Facts, shots: Callable[[], Iterator[Shot]]) -> Iterator[Shot]:
-    """Yield the frames of a file, turned as the user wants them."""
-    with _reading(facts.path):
-        for shot in shots():
-            yield replace(shot, load=partial(_loaded, facts, shot.load))
+def shots_of(file: EventFile) -> Iterator[Shot]:
+    """Yield the frames of the part that is wanted, turned and cut, in the order of time."""
+    begin_us, end_us = _wanted_us(file)
+    with _reading(file.facts.path):
+        for shot in () if file.shots is None else file.shots():
+            if begin_us <= shot.t_ns / 1000 <= end_us:
+                yield replace(shot, load=partial(_loaded, file.facts, shot))
 
 
-def _loaded(facts: Facts, load: Callable[[], Frame]) -> Frame:
+def _loaded(facts: Facts, shot: Shot) -> Frame:
     with _reading(facts.path):
-        frame = load()
-    return rotated180(frame) if facts.rotate180 else frame
+        frame = shot.load()
+    size, crop = Size(*frame.image.shape[1::-1]), facts.selection.crop
+    if crop is not None and not crop.is_inside(*size):
+        raise DataError(f"{shot.label}: --crop {crop} is not inside its {size} pixels")
+    return facts.selection.of_frame(frame)
 
 
 @contextmanager
@@ -206,8 +215,6 @@ class Survey:
     ----------
     count : int
         Events until now.
-    first_us : int or None
-        Time of the first one in the file [us].
     steps_back : int
         How often an event is earlier than that before it in the file.
     """
@@ -215,7 +222,6 @@ class Survey:
     def __init__(self, file: EventFile) -> None:
         self._file, self._facts = file, file.facts
         self.count = self.steps_back = self._largest_back_us = 0
-        self.first_us: int | None = None
         self._unstorable = self._outside = self._odd = 0
         self._needed = (0, 0)
         self._signs: set[int] = set()
@@ -228,7 +234,6 @@ class Survey:
         if not t.size:
             return
         self.count += t.size
-        self.first_us = int(t[0]) if self.first_us is None else self.first_us
         step = np.diff(t, prepend=self._columns["t"].last if self._columns["t"].size else t[0])
         back = step < 0
         if back.any():
@@ -269,6 +274,7 @@ class Survey:
             sensor, and nobody asked for the others.
         """
         self._check_columns()
+        self._facts.span_us = self.span_us()
         if self._unstorable:
             self._tell_outside(self._unstorable, "with a coordinate below 0 or above 65535")
         if self._odd:
@@ -283,6 +289,14 @@ class Survey:
             where = f"outside {size[0]}x{size[1]}, which {self._facts.stated_by} states"
             self._tell_outside(self._outside, where)
         return size
+
+    def span_us(self) -> tuple[int, int]:
+        """Return first and last time of the events [us], of the frames where there are none."""
+        if self.count:
+            return self._columns["t"].least, self._columns["t"].most
+        with _reading(self._facts.path):
+            shots = [] if self._file.shots is None else list(self._file.shots())
+        return (microseconds(shots[0].t_ns), microseconds(shots[-1].t_ns)) if shots else (0, 0)
 
     def tell_order(self) -> None:
         """Tell of events out of order, which were sorted."""
@@ -412,7 +426,7 @@ def events_of_file(file: EventFile, survey: Survey | None = None) -> Iterator[Ev
             if file.offset_us:
                 t += file.offset_us
                 check_us(t, label)
-            if file.facts.rotate180 and geometry is not None:
+            if file.facts.selection.rotate180 and geometry is not None:
                 x, y = geometry[0] - 1 - x.astype(np.int64), geometry[1] - 1 - y.astype(np.int64)
             if survey is not None:
                 survey.note((t, x, y, p))
@@ -436,7 +450,7 @@ def events_of_file(file: EventFile, survey: Survey | None = None) -> Iterator[Ev
 
 
 def assemble(file: EventFile) -> Recording:
-    """Return all that a file holds, its events sorted and inside its geometry."""
+    """Return the part of a file that is wanted, its events sorted and inside its geometry."""
     facts, survey = file.facts, Survey(file)
     parts = list(events_of_file(file, survey))
     size = survey.settle()
@@ -446,16 +460,18 @@ def assemble(file: EventFile) -> Recording:
         facts.tell(f"times begin below zero, at {events['t'][0] / 1e6:.6f} s")
     if count := repeated(events):
         facts.tell(f"{count} events repeat another one exactly: kept")
-    shots = list(file.shots()) if file.shots is not None else None
-    times = None if shots is None else np.array([shot.t_ns for shot in shots], np.int64)
-    facts.problems += _disagreement(events, times)
+    if file.shots is not None:
+        facts.problems += _disagreement(events, _times_ns(file.shots()))
+    size = _size_wanted(file, size)
+    events = next(_wanted(file, [events]), events[:0])
+    shots = None if file.shots is None else list(shots_of(file))
     return Recording(
         path=str(facts.path),
         layout=file.layout,
         width=size[0],
         height=size[1],
         events=events,
-        frame_times_ns=times,
+        frame_times_ns=None if shots is None else _times_ns(shots),
         metadata=facts.description,
         problems=facts.problems,
         images=lambda: (shot.load() for shot in shots or ()),
@@ -464,7 +480,7 @@ def assemble(file: EventFile) -> Recording:
 
 
 def events_in_order(file: EventFile) -> tuple[tuple[int, int], int, Generator[Events, None, None]]:
-    """Return the size of the sensor, the time of the first event [us], and all events in order.
+    """Return size and first time [us] of the part that is wanted, and its events in order.
 
     The events come part by part, those on the sensor.  What is doubtful is added to the problems of
     the file.  Only events out of order are all kept in memory, to be sorted.
@@ -472,23 +488,89 @@ def events_in_order(file: EventFile) -> tuple[tuple[int, int], int, Generator[Ev
     Raises
     ------
     DataError
-        There are no events, and no size is stated; or the file cannot be read.
+        There are no events, and no size is stated; the part is not on the sensor, or holds nothing;
+        or the file cannot be read.
     """
-    survey = Survey(file)
-    for _ in events_of_file(file, survey):
-        pass
-    size = survey.settle()
+    survey, size = _surveyed(file)
     if size == (0, 0):
         raise DataError(
             f"{file.facts.path}: no events, and no size of the sensor: state it with --size"
         )
     if survey.steps_back:
-        events = _all_in_order(file, list(events_of_file(file)), size)
+        parts = iter([_all_in_order(file, list(events_of_file(file)), size)])
         survey.tell_order()
-        first_us = int(events["t"][0]) if events.size else 0
-        return size, first_us, (part for part in [events] if part.size)
-    fitting = (inside(events, size) for events in events_of_file(file))
-    return size, survey.first_us or 0, (events for events in fitting if events.size)
+    else:
+        parts = (inside(events, size) for events in events_of_file(file))
+    first_us = _span_us(file)[0] + file.facts.selection.start_ns // 1000
+    return _size_wanted(file, size), first_us, _wanted(file, parts)
+
+
+def _surveyed(file: EventFile) -> tuple[Survey, tuple[int, int]]:
+    """Return the survey of all events, and the size of the sensor."""
+    survey = Survey(file)
+    for _ in events_of_file(file, survey):
+        pass
+    return survey, survey.settle()
+
+
+def _span_us(file: EventFile) -> tuple[int, int]:
+    if file.facts.span_us is None:
+        file.facts.span_us = _surveyed(file)[0].span_us()
+    return file.facts.span_us
+
+
+def _wanted_us(file: EventFile) -> tuple[float, float]:
+    """Return the first and the last time of the part that is wanted [us]."""
+    wanted = file.facts.selection
+    if not wanted.is_timed:
+        return -math.inf, math.inf
+    first_us, _ = _span_us(file)
+    begin_us = first_us + wanted.start_ns / 1000 if wanted.start_ns else -math.inf
+    return begin_us, first_us + wanted.stop_ns / 1000
+
+
+def _size_wanted(file: EventFile, size: tuple[int, int]) -> tuple[int, int]:
+    """Return the size of the part of a sensor that is wanted; DataError if it is not on it."""
+    crop = file.facts.selection.crop
+    if crop is None:
+        return size
+    if not crop.is_inside(*size):
+        raise DataError(
+            f"{file.facts.path}: --crop {crop} does not lie on the sensor of {Size(*size)} pixels"
+        )
+    return crop.width, crop.height
+
+
+def _wanted(file: EventFile, parts: Iterable[Events]) -> Generator[Events, None, None]:
+    """Yield what is wanted of sorted events; DataError if that leaves no events and no frames."""
+    begin_us, end_us = _wanted_us(file)
+    wanted, found = file.facts.selection, False
+    for events in parts:
+        times = events["t"]
+        some = events[bisect_left(times, begin_us) : bisect_right(times, end_us)]
+        if wanted.crop is not None:
+            x, y, width, height = wanted.crop
+            some = some[(some["x"] >= x) & (some["y"] >= y)]
+            some["x"] -= x
+            some["y"] -= y
+            some = inside(some, (width, height))
+        elif some.size < events.size:
+            some = some.copy()  # without the rest in memory
+        if some.size:
+            found = True
+            yield some
+        if times.size and times[-1] > end_us:
+            break
+    if not found and (wanted.is_timed or wanted.crop) and next(shots_of(file), None) is None:
+        first_us, last_us = _span_us(file)
+        raise DataError(
+            f"{file.facts.path}: --start, --stop and --crop leave no event of its"
+            f" {(last_us - first_us) / 1e6:.6f} s"
+        )
+
+
+def _times_ns(shots: Iterable[Shot]) -> NDArray[np.int64]:
+    return np.array([shot.t_ns for shot in shots], np.int64)
 
 
 def _all_in_order(file: EventFile, parts: list[Events], size: tuple[int, int]) -> Events:
@@ -513,9 +595,9 @@ def _length(time_us: int) -> str:
     return f"{time_us} us"
 
 
-def _disagreement(events: Events, times_ns: NDArray[np.int64] | None) -> list[str]:
+def _disagreement(events: Events, times_ns: NDArray[np.int64]) -> list[str]:
     """Return a warning if events and frames seem to be on different clocks, else nothing."""
-    if times_ns is None or len(times_ns) < 2 or len(events) < _FEW:
+    if len(times_ns) < 2 or len(events) < _FEW:
         return []
     begin, end = int(events["t"][0]) * 1000, int(events["t"][-1]) * 1000
     first, last = int(times_ns.min()), int(times_ns.max())

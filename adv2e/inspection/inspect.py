@@ -18,7 +18,7 @@ from adv2e.files.zips import Members
 from adv2e.formats.reading import Recording, read_events
 from adv2e.formats.registry import may_hold_events
 from adv2e.light.decoding import light_text
-from adv2e.options import EventInput, FrameInput, InfoOptions, chosen, declared, takes
+from adv2e.options import EventInput, InfoOptions, SourceOptions, chosen, declared, takes
 from adv2e.sources import OPENERS, PICTURES, STDIN, Source, open_source
 from adv2e.sources.frame import Light
 from adv2e.sources.stored import EVENTS, LIST
@@ -78,7 +78,7 @@ def info(
                 "--size is that of raw video here, of which --pixel-format says the rest: frames"
                 " are described as they are"
             )
-        source = open_source(path, **chosen(FrameInput, options))
+        source = open_source(path, **chosen(SourceOptions, options))
         return _of_source(source, progress or (lambda done, total: None))
     for name in ("fps", "timestamps", "bayer", "pixel_format", "allow_damaged"):
         if options.get(name):

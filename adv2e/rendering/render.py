@@ -80,7 +80,7 @@ def render(
         if path is None:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="adv2e-render-"))
             path = Path(folder) / "events.png"
-        recording = _recording(events, chosen(EventInput, options))
+        recording = _recording(events, reading_of(options))
         render_recording(
             recording,
             path,
@@ -92,6 +92,11 @@ def render(
             return None
         picture: Any = cv2.imread(str(path))
         return np.ascontiguousarray(picture[:, :, ::-1], np.uint8)
+
+
+def reading_of(options: RenderOptions) -> EventInput:
+    """Return the options of the reading: a film shows the frame before its start, too."""
+    return {**chosen(EventInput, options), "start_s": None, "stop_s": None}
 
 
 def chosen_style(output: str | Path, options: RenderOptions) -> Style:

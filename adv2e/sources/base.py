@@ -23,7 +23,7 @@ from adv2e.effects.frames.brightness import doubt_of_white
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError, UsageError
 from adv2e.geometry import Rectangle, Size
-from adv2e.options import FrameInput, SourceOptions, crop_of
+from adv2e.options import EventInput, FrameInput, SourceOptions, crop_of
 from adv2e.sources.frame import (
     OVER_BLACK,
     Frame,
@@ -225,7 +225,7 @@ class Source(ABC):
 
     def _too_few(self, count: int, span_ns: int) -> DataError:
         found = "no frames" if count == 0 else "a single frame"
-        if self.selection.start_s is None and self.selection.stop_s is None:
+        if not self.selection.is_timed:
             return DataError(f"{self.path}: {found}; at least two are needed")
         return DataError(
             f"{self.path}: --start and --stop leave {found}, and at least two are needed; frames"
@@ -241,7 +241,7 @@ class Source(ABC):
         if this != first:
             told = _description(*this), _description(*first)
             raise DataError(f"{label}: {told[0]}, but the first frame is {told[1]}")
-        frame = self._wanted(frame)
+        frame = self.selection.of_frame(frame)
         check_values(frame.image, label)
         if frame.alpha is not None or frame.composed:
             self._note(OVER_BLACK)
@@ -254,17 +254,6 @@ class Source(ABC):
             self.largest_read = max(self.largest_read, float(image.max()))
         odd = "" if self._white_told is not None else odd_white(frame, self._white_stated)
         return replace(frame, t_ns=t_ns, label=label, white=self.full_scale, odd_white=odd)
-
-    def _wanted(self, frame: Frame) -> Frame:
-        """Return the selected part of a frame, upright, without the rest in memory."""
-        if self.selection.rotate180:
-            frame = rotated180(frame)
-        crop = self.selection.crop
-        if crop is None:
-            return frame
-        part = slice(crop.y, crop.y + crop.height), slice(crop.x, crop.x + crop.width)
-        alpha = None if frame.alpha is None else frame.alpha[part].copy()
-        return replace(frame, image=frame.image[part].copy(), alpha=alpha)
 
 
 def _description(size: Size, dtype: np.dtype[Any], colour: bool) -> str:
@@ -324,13 +313,13 @@ class GivenTimes:
 
 @dataclass(frozen=True)
 class Selection:
-    """Selection of frames and zero of their time.
+    """Selection of frames, or events, and zero of their time.
 
     Parameters
     ----------
     start_s, stop_s : float, optional
-        First and last time wanted, counted from the source's first frame [s]; a frame at either
-        is in, so that neighbouring pieces share the frame between them.
+        First and last time wanted, counted from the source's first frame, or event [s]; a frame at
+        either is in, so that neighbouring pieces share the frame between them.
     t0 : {'auto', 'keep', 'zero'}
         auto, keep: the source's own clock where there is one, else zero at the source's first
         frame.  zero: zero at the first frame wanted.
@@ -356,7 +345,7 @@ class Selection:
     track: str | None = None
 
     @classmethod
-    def of(cls, options: SourceOptions) -> Selection:
+    def of(cls, options: SourceOptions | EventInput) -> Selection:
         """Return what options say."""
         given: dict[str, Any] = {item.name: options.get(item.name) for item in fields(cls)}
         track = options["track"]
@@ -373,3 +362,19 @@ class Selection:
     def stop_ns(self) -> float:
         """Last time wanted, from the first frame [ns]; infinite when there is none."""
         return math.inf if self.stop_s is None else round(self.stop_s * NS_PER_S)
+
+    @property
+    def is_timed(self) -> bool:
+        """A part of the time is wanted."""
+        return self.start_s is not None or self.stop_s is not None
+
+    def of_frame(self, frame: Frame) -> Frame:
+        """Return the selected part of a frame, upright, without the rest in memory."""
+        if self.rotate180:
+            frame = rotated180(frame)
+        if self.crop is None:
+            return frame
+        x, y, width, height = self.crop
+        part = slice(y, y + height), slice(x, x + width)
+        alpha = None if frame.alpha is None else frame.alpha[part].copy()
+        return replace(frame, image=frame.image[part].copy(), alpha=alpha)

@@ -156,7 +156,7 @@ class ListedSource(Source):
         self.doubts += gap_doubts([shot.t_ns for shot in shots], str(path))
         first = shots[0].load()
         self._describe(first, shots[0].label, light)
-        check_values(self._wanted(first).image, shots[0].label)
+        check_values(self.selection.of_frame(first).image, shots[0].label)
         self.largest = float(first.image.max())
         if self.dtype.kind == "u":
             self._look_for_white()

@@ -28,7 +28,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
-from adv2e.errors import UsageError
 from adv2e.options import SourceOptions
 
 Offset = tuple[float, float]
@@ -84,11 +83,6 @@ class SensorPath:
         Length of its longer side [pixels of the sensor]; default: as usual.
     duration_s : float, optional
         Default: as usual.
-
-    Raises
-    ------
-    UsageError
-        If a value is impossible.
     """
 
     kind: str
@@ -102,11 +96,6 @@ class SensorPath:
         if kind is None:
             return None
         return cls(kind, options["extent_px"], options["duration_s"])
-
-    def __post_init__(self) -> None:
-        for name, value in (("--extent", self.extent_px), ("--duration", self.duration_s)):
-            if value is not None and not 0 < value < 1e6:
-                raise UsageError(f"{name}: must be above 0 and below a million, got {value:g}")
 
     @property
     def extent(self) -> float:

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import adv2e as package
 from adv2e.comparison import resimulation
 from adv2e.events import make_events, sort_events
 from adv2e.formats.writing import open_sink
@@ -123,6 +124,33 @@ def test_frames_from_elsewhere_make_windows_and_floor(adv2e, write, simulation, 
     report = json.loads(adv2e("compare", *files, "--json").out)
     assert report["windows"]["edges_us"] == [20_000, 40_000, 60_000, 80_000]
     assert len(simulation[0][0]) == 6
+
+
+@pytest.mark.filterwarnings("ignore:.*repeat another")
+def test_the_function_is_the_command(adv2e, pair):
+    words = ("--start", "0.02", "--stop", "0.09", "--crop", "2,1,6,5", "--window", "0.01")
+    report = json.loads(adv2e("compare", *pair, *words, "--json").out)
+    given = {"start_s": 0.02, "stop_s": 0.09, "crop": (2, 1, 6, 5), "window_s": 0.01}
+    assert package.compare(*pair, **given) == report
+    assert (report["measured"]["width"], report["simulated"]["height"]) == (6, 5)
+    first = int(some_events(1)["t"][0])
+    edges = report["windows"]["edges_us"]
+    assert first + 20_000 <= edges[0] < first + 21_000
+    assert edges[-1] <= first + 90_000
+
+
+def test_frames_of_a_part_are_those_of_its_time(adv2e, pair):
+    report = json.loads(adv2e("compare", *pair, "--start", "0.03", "--json").out)
+    assert report["windows"]["edges_us"] == [40_000, 60_000, 80_000]
+
+
+def test_the_unit_of_times_is_that_of_frames_from_elsewhere_too(adv2e, write, tmp_path):
+    measured, simulated = write("real.h5", some_events(1)), write("made.h5", some_events(2))
+    np.save(tmp_path / "frames.npy", np.zeros((6, HEIGHT, WIDTH), np.uint8))
+    (tmp_path / "frames.timestamps.txt").write_text("".join(f"{20 * n}\n" for n in range(6)))
+    frames = ("--frames", tmp_path / "frames.npy", "--time-unit", "ms")
+    report = json.loads(adv2e("compare", measured, simulated, *frames, "--json").out)
+    assert report["windows"]["edges_us"] == [20_000, 40_000, 60_000, 80_000]
 
 
 def test_frames_beside_measured_events_are_never_scaled(adv2e, pair, simulation):

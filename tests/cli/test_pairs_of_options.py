@@ -28,7 +28,11 @@ from adv2e.formats.reading import read_events
 NO: tuple[str, ...] = ()
 VOICE = [NO, ("-q",), ("-v",), ("--progress",), ("--no-progress",)]
 SET_BACK = [NO, ("--set-back", "continue"), ("--set-back", "sort")]
-PART = {"start": [NO, ("--start", "0.02")], "stop": [NO, ("--stop", "0.08")]}
+PART = {
+    "start": [NO, ("--start", "0.02")],
+    "stop": [NO, ("--stop", "0.08")],
+    "crop": [NO, ("--crop", "2,4,12,6")],
+}
 TURN = [NO, ("--rotate180",)]
 THREADS = [NO, ("--threads", "1"), ("--threads", "2")]
 EXISTING = ["new", "there", "--overwrite"]
@@ -46,7 +50,6 @@ CONVERT = {
     ],
     "times": [NO, ("--fps", "50"), ("--timestamps", "t.txt", "--time-unit", "ms")],
     **PART,
-    "crop": [NO, ("--crop", "2,4,12,6")],
     "turn": TURN,
     "bayer": [NO, ("--bayer", "grbg")],
     "damaged": [NO, ("--allow-damaged",)],
@@ -120,6 +123,7 @@ def fits_render(row):
 INFO = {
     "input": ["clip.mp4", "pictures", "listed", "s.npy", "recording", "e.h5", "e.txt", "-"],
     "times": [NO, ("--fps", "50"), ("--timestamps", "t.txt", "--time-unit", "ms")],
+    **PART,
     "turn": TURN,
     "bayer": [NO, ("--bayer", "grbg")],
     "damaged": [NO, ("--allow-damaged",)],
@@ -155,6 +159,7 @@ EXPORT = {
     "counts": [NO, ("--counts", "raw")],
     "valid": [NO, ("--valid", "0.5")],
     "split": [NO, ("--split", "test")],
+    **PART,
     "back": SET_BACK,
     "outside": [NO, ("--crop-events",)],
     "threads": THREADS,
@@ -189,6 +194,7 @@ COMPARE = {
     "window": [NO, ("--window", "0.02")],
     "frames": [NO, ("--frames", "listed")],
     "model": [NO, ("--seed", "4"), ("--set", "pixel.leak=null"), OWN_SENSOR],
+    **PART,
     "turn": TURN,
     "back": SET_BACK,
     "outside": [NO, ("--crop-events",)],

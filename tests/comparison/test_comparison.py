@@ -2,38 +2,30 @@ from __future__ import annotations
 
 import itertools
 import json
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from adv2e.comparison.compare import STATISTICS, WARNING, Resimulation, compare
+from adv2e.comparison import resimulation
+from adv2e.comparison.compare import STATISTICS, WARNING, compare
 from adv2e.comparison.distances import MEASURES, distances
 from adv2e.comparison.report import text
 from adv2e.comparison.windows import Windows
-from adv2e.errors import DataError
+from adv2e.errors import DataError, UsageError
 from adv2e.events import empty_events
-
-
-@dataclass(frozen=True)
-class Stream:
-    path: str
-    events: Any
-    frame_times_ns: Any = None
-    layout: str = "monash"
-    width: int = 12
-    height: int = 9
+from adv2e.formats.recording import Recording
 
 
 @pytest.fixture
 def measured(random_events):
-    return Stream("real.zip", random_events(1, 3000), np.arange(0, 120_000_000, 20_000_000))
+    times_ns = np.arange(0, 120_000_000, 20_000_000)
+    return Recording("real.zip", "monash", 12, 9, random_events(1, 3000), times_ns)
 
 
 @pytest.fixture
 def simulated(random_events):
-    return Stream("made.h5", random_events(2, 2500))
+    return Recording("made.h5", "monash", 12, 9, random_events(2, 2500))
 
 
 def test_the_windows_are_the_frame_intervals_of_the_measured_recording(measured, simulated):
@@ -94,9 +86,14 @@ def test_statistics_are_those_of_the_time_compared(measured, simulated):
     assert statistics["latency_offset_us"]["value"] is None
 
 
-def test_a_way_to_simulate_again_gives_the_floor_of_two_seeds(measured, simulated, random_events):
-    again = Resimulation(lambda seed: random_events(seed, 2500), (4, 5))
-    report = compare(measured, simulated, again=again)
+def test_a_configuration_gives_the_floor_of_two_seeds(
+    measured, simulated, random_events, monkeypatch
+):
+    def resimulator(*given, threads):
+        return lambda seed: random_events(seed, 2500)
+
+    monkeypatch.setattr(resimulation, "resimulator", resimulator)
+    report = compare(measured, simulated, {"seed": 4})
     edges = report["windows"]["edges_us"]
     windows = Windows("", tuple(itertools.pairwise(edges)), len(edges) - 1)
     draws = random_events(4, 2500), random_events(5, 2500)
@@ -106,6 +103,13 @@ def test_a_way_to_simulate_again_gives_the_floor_of_two_seeds(measured, simulate
     assert found["bins_shared_window"] > 0
     assert "4 and 5" in report["floors"]["two_seeds"]
     assert "two_seeds" in text(report)
+
+
+def test_how_to_read_is_said_of_files_alone(measured, simulated):
+    with pytest.raises(UsageError, match="crop: is of the reading of a file"):
+        compare(measured, simulated, crop=(0, 0, 2, 2))
+    with pytest.raises(UsageError, match="start_s: is of the reading of a file"):
+        compare(measured, "made.h5", start_s=0.1, crop=(0, 0, 2, 2))
 
 
 def test_the_report_is_plain_json(measured, simulated):

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from streams import random_events
 
+import adv2e
+from adv2e.errors import UsageError
 from adv2e.formats.writing import open_sink
 
 SIZE = WIDTH, HEIGHT = 30, 20
@@ -193,6 +195,19 @@ def test_what_cannot_be(given, status, told, adv2e):
     found = adv2e("export", "a.txt", "-o", "out", *given)
     assert (found.status, told in found.err) == (status, True), found.err
     assert sorted(path.name for path in Path().iterdir()) == ["a.txt", "a.txt.json"]
+
+
+@pytest.mark.parametrize(
+    ("to", "given", "told"),
+    [
+        ("e2vid", {"valid": 0.95}, r"valid: must be a share from 0 to 0\.9, got 0\.95"),
+        ("voxel", {"window_us": 0}, "window_us: must be a whole number from 1 on, got 0"),
+        ("voxel", {"count": 3, "bins": 10_001}, "bins: must be at most 10000, got 10001"),
+    ],
+)
+def test_values_are_checked_in_python_as_on_the_command_line(to, given, told):
+    with pytest.raises(UsageError, match=told):
+        adv2e.export("a.txt", "out", to, **given)
 
 
 def test_recordings_of_one_name_take_that_of_their_folder(adv2e):

@@ -127,7 +127,7 @@ def test_what_the_user_says_of_it_is_done_and_told(tmp_path):
     by_time = read_events(path, set_back="sort")
     assert by_time.events["t"].tolist() == sorted(np.where(begun <= TRUE, TRUE - begun, TRUE))
     assert any("(1 steps back, the largest" in problem for problem in by_time.problems)
-    with pytest.raises(UsageError, match="--set-back: must be continue or sort"):
+    with pytest.raises(UsageError, match="set_back: must be continue or sort"):
         read_events(path, set_back="forwards")
 
 

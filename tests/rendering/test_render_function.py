@@ -48,6 +48,10 @@ def test_the_command_draws_the_same(events, adv2e, tmp_path, monkeypatch):
         ("a.doc", {"size": SIZE}, UsageError, r"a\.doc: a film ends in"),
         ("a.avi", {"size": SIZE, "at_s": [1]}, UsageError, r"a\.avi: instants \(at_s\) are for"),
         ("a.png", {"size": SIZE, "style": "pink"}, UsageError, "style: must be white, black"),
+        ("a.avi", {"size": SIZE, "fps": 0}, UsageError, "fps: must be a number above 0, got 0"),
+        ("a.png", {"size": SIZE, "window_ms": -2.5}, UsageError, "window_ms: must be a number"),
+        ("a.png", {"size": SIZE, "scale": 33}, UsageError, "scale: must be at most 32, got 33"),
+        ("a.png", {"size": SIZE, "count": 2.5}, UsageError, "count: must be a whole number"),
     ],
 )
 def test_what_cannot_be(events, tmp_path, output, given, error, text):

@@ -90,7 +90,7 @@ def test_a_video_has_colours_already(write_video, picture):
 
 def test_patterns_that_there_are_not(tmp_path, adv2e):
     path = write("npy", tmp_path / "a", mosaic("RGGB"))
-    with pytest.raises(UsageError, match="--bayer: must be RGGB, BGGR, GRBG or GBRG"):
+    with pytest.raises(UsageError, match="bayer: must be RGGB, BGGR, GRBG or GBRG"):
         open_source(path, fps=10, bayer="RGBG")
     assert adv2e("convert", path, "--fps", "10", "--bayer", "RGBG").status == 2
 

@@ -168,9 +168,12 @@ def test_in_python_a_path_has_its_measures_and_they_a_path():
 
 
 def test_paths_that_cannot_be():
-    with pytest.raises(UsageError, match="--motion: must be saccade, shake or pan"):
+    with pytest.raises(UsageError, match="motion: must be saccade, shake or pan"):
         open_source("photo.png", motion="hop")
-    with pytest.raises(UsageError, match="--extent: must be above 0"):
-        SensorPath("pan", -1.0)
+    for value in (-1.0, 0, float("inf"), "9"):
+        with pytest.raises(UsageError, match="extent_px: must be a number above 0"):
+            open_source("photo.png", motion="pan", extent_px=value)
+    with pytest.raises(UsageError, match="duration_s: must be at most 1000000"):
+        open_source("photo.png", motion="pan", duration_s=1e7)
     with pytest.raises(DataError, match="too few for a path"):
         fitting_of(6, 30, None, "photo.png", SensorPath("saccade"))

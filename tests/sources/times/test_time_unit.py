@@ -60,7 +60,7 @@ def test_a_video_of_its_own_times_has_no_use_for_a_unit(clip):
         open_source(clip, time_unit="ms")
     with pytest.raises(UsageError, match="--time-unit is for lists of times, which --fps"):
         open_source(clip, fps=30, time_unit="ms")
-    with pytest.raises(UsageError, match="--time-unit: must be s, ms, us or ns, got 'm'"):
+    with pytest.raises(UsageError, match="time_unit: must be s, ms, us or ns, got 'm'"):
         open_source(clip, time_unit="m")
 
 
