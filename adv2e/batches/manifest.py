@@ -20,7 +20,6 @@ import re
 from collections.abc import Iterator, Mapping
 from datetime import datetime, timezone
 from pathlib import Path, PurePath, PurePosixPath
-from types import TracebackType
 from typing import Any, BinaryIO
 
 from adv2e.errors import DataError, OutputError
@@ -122,12 +121,7 @@ class Manifest:
     def __enter__(self) -> Manifest:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         unlock_file(self._file)
         self._file.close()
 

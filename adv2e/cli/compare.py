@@ -8,8 +8,8 @@ import click
 
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
-from adv2e.cli.progress import reading_told
 from adv2e.options import EventInput
+from adv2e.process.bars import reading_bar
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -87,9 +87,9 @@ def command(
     from adv2e.formats.reading import read_events
 
     declared = config()
-    with reading_told(measured, progress) as told:
+    with reading_bar(measured, progress) as told:
         ours = read_events(measured, progress=told, **given)
-    with reading_told(simulated, progress) as told:
+    with reading_bar(simulated, progress) as told:
         theirs = read_events(
             simulated, progress=told, **{**given, "rotate180": False, "track": None}
         )

@@ -9,8 +9,8 @@ import click
 
 from adv2e.cli import options
 from adv2e.cli.commands import Command
-from adv2e.cli.progress import reading_told
 from adv2e.options import InfoOptions
+from adv2e.process.bars import reading_bar
 
 
 @click.command("info", cls=Command)
@@ -40,7 +40,7 @@ def command(
     from adv2e.inspection.inspect import info
 
     log(f"reading {file}", 1)
-    with reading_told(file, progress) as told:
+    with reading_bar(file, progress) as told:
         report = info(file, progress=told, **given)
     if as_json:
         import json

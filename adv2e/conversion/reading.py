@@ -12,7 +12,6 @@ from concurrent.futures import Future
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
@@ -98,7 +97,7 @@ class Decoding:
         return Still(frame.t_ns, light, picture)
 
 
-class Reading:
+class Reading(ExitStack):
     """A source, and the reading of its frames; to be used as a context, once.
 
     With more than one thread, frames are read in a thread of their own from the beginning of the
@@ -119,10 +118,10 @@ class Reading:
     ) -> None:
         self.path, self.options = path, options
         self.threads = threads or default_threads()
+        super().__init__()
         self._opened: Source | Adv2eError | None = None
         self._decoding: Future[Decoding] = Future()
         self._stills: Iterator[Still] = iter(())
-        self._at_end = ExitStack()
 
     @property
     def source(self) -> Source:
@@ -168,19 +167,11 @@ class Reading:
         self._stills = _stills(source.frames(), self._decoding)
         if self.threads > 1 and not source.waits:
             count = AHEAD_BYTES // (8 * source.width * source.height)
-            self._stills = self._at_end.enter_context(
+            self._stills = self.enter_context(
                 read_ahead(self._stills, min(max(1, count), AHEAD_FRAMES))
             )
-            self._at_end.callback(self._decoding.cancel)  # its thread may wait for it
+            self.callback(self._decoding.cancel)  # its thread may wait for it
         return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._at_end.__exit__(kind, error, trace)
 
 
 def _stills(frames: Iterator[Frame], decoding: Future[Decoding]) -> Generator[Still, None, None]:

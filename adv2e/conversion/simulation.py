@@ -137,7 +137,7 @@ def simulate(
             (t, fitting.light(now, f"frame {number}")) for number, (t, now) in enumerate(light)
         )
     made = events_from_light(
-        _shown(light, count) if progress else light,
+        bars.bar(iterable=light, total=count, unit=" frames") if progress else light,
         config,
         hooks=hooks,
         threads=threads,
@@ -169,16 +169,6 @@ def _filled(chunks: Iterator[Events]) -> Iterator[Events]:
         del chunk  # or it would stay while the next one is made
     if not is_any:
         yield nothing
-
-
-def _shown(
-    light: Iterable[tuple[int, NDArray[Any]]], count: int | None
-) -> Iterator[tuple[int, NDArray[Any]]]:
-    """Yield the frames, with a progress bar on stderr."""
-    with bars.bar(total=count, unit=" frames") as bar:
-        for frame in light:
-            bar.update()
-            yield frame
 
 
 def _instants(times: Any, fps: Rate | None) -> tuple[Iterable[float], bool]:

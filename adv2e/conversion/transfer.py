@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,14 +25,14 @@ from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.files.regular import shown
 from adv2e.files.staging import Staging
-from adv2e.formats.event_file import EventFile, Progress
+from adv2e.formats.event_file import EventFile
 from adv2e.formats.reading import events_in_order, inside, open_events
 from adv2e.formats.registry import check_frames, to_write
 from adv2e.formats.writing import PACKAGES, Sink, open_sink
 from adv2e.geometry import Rectangle
 from adv2e.light.pictures import picture_of, picture_white
 from adv2e.options import CopyOptions, EventInput, chosen, crop_of, takes
-from adv2e.process import bars
+from adv2e.process.bars import share_bar
 from adv2e.sources.base import Selection
 from adv2e.sources.frame import Light, Pixels
 
@@ -128,7 +128,8 @@ def convert_events(
         raise DataError(
             f"{path}: its events have no causes; only 'adv2e convert --causes' has them"
         )
-    with _bar(path, options["progress"]) as facts.progress:
+    doing = f"looking through {Path(path).name}"
+    with share_bar(doing, "writing", options["progress"]) as facts.progress:
         found, first_us, parts = events_in_order(file)
         part = _part(path, found, first_us, selection, crop_of(options))
         width, height = part.crop[2:]
@@ -252,28 +253,3 @@ def copied_metadata(
         "converted": {"adv2e": __version__, **origin, **converted},
         **stored,
     }
-
-
-class _Bar:
-    """A bar on stderr for a file that is read twice."""
-
-    def __init__(self, path: str) -> None:
-        self._bar = bars.bar(desc=f"looking through {Path(path).name}")
-        self._bar.bar_format = "{desc}: {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
-
-    def __enter__(self) -> Progress:
-        return self._told
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.close()
-
-    def _told(self, done: int, total: int) -> None:
-        if done < self._bar.n:
-            self._bar.reset()
-            self._bar.set_description_str("writing")
-        self._bar.total = total
-        self._bar.update(done - self._bar.n)
-
-
-def _bar(path: str, progress: bool) -> Any:
-    return _Bar(path) if progress else nullcontext(lambda done, total: None)
