@@ -129,11 +129,7 @@ def plan(
 
 
 def _why(
-    record: Mapping[str, Any] | None,
-    state: State,
-    sequence: Found,
-    output: Path,
-    wanted: Wanted,
+    record: Mapping[str, Any] | None, state: State, sequence: Found, output: Path, wanted: Wanted
 ) -> str:
     if record is None:
         return "new"

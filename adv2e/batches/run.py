@@ -199,11 +199,7 @@ class Batch:
         """
         records = read_records(self.dest)
         tasks = plan(
-            self._sequences,
-            self._states,
-            records,
-            self._wanted,
-            overwrite=self._overwrite,
+            self._sequences, self._states, records, self._wanted, overwrite=self._overwrite
         )
         for path in outputs_outside(tasks, self._wanted):
             raise OutputError(f"{shown(path)}: a link leads out of {shown(self.dest)}: remove it")
@@ -452,11 +448,7 @@ class _Told:
     """The bar over all sequences, and a line for each failure."""
 
     def __init__(
-        self,
-        work: Batch,
-        options: BatchOptions,
-        log: Callable[[str, int], None],
-        stack: ExitStack,
+        self, work: Batch, options: BatchOptions, log: Callable[[str, int], None], stack: ExitStack
     ) -> None:
         self._work, self._options, self._log, self._stack = work, options, log, stack
         self._bar: Any = None
@@ -527,12 +519,7 @@ def _job(task: Task, settings: Settings, wanted: Wanted, threads: int) -> Job:
     )
 
 
-def _record(
-    task: Task,
-    wanted: Wanted,
-    job: Job,
-    found: Mapping[str, Any],
-) -> dict[str, Any]:
+def _record(task: Task, wanted: Wanted, job: Job, found: Mapping[str, Any]) -> dict[str, Any]:
     kept = task.record or {}
     return {
         **{key: value for key, value in kept.items() if not key.startswith("export")},

@@ -81,11 +81,7 @@ class Found:
 
 
 def find_sequences(
-    root: Path,
-    layout: str = "auto",
-    *,
-    leave_out: Path | None = None,
-    fps: Rate | None = None,
+    root: Path, layout: str = "auto", *, leave_out: Path | None = None, fps: Rate | None = None
 ) -> Found:
     """Return the sequences below a folder; or that of a file.
 

@@ -19,11 +19,7 @@ from adv2e.process.bars import reading_bar
 @options.declared_options(InfoOptions)
 @options.reporting_options
 def command(
-    file: Path,
-    as_json: bool,
-    given: dict[str, Any],
-    progress: bool,
-    log: options.Log,
+    file: Path, as_json: bool, given: dict[str, Any], progress: bool, log: options.Log
 ) -> None:
     """Show what a video, a recording or an event file holds.
 

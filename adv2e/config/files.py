@@ -170,11 +170,7 @@ def to_annotated_yaml(config: Config, forms: Mapping[str, str] | None = None) ->
 
 
 def _lines(
-    section: type[Section],
-    values: Section | None,
-    indent: str,
-    path: str,
-    forms: Mapping[str, str],
+    section: type[Section], values: Section | None, indent: str, path: str, forms: Mapping[str, str]
 ) -> Iterator[tuple[str, str]]:
     """Yield each line of YAML and its comment; without `values`, those of a section that is off."""
     for key in keys_of(section, path):

@@ -120,11 +120,7 @@ def diagnose(
             detectable=detectable(reference, search.declared, search.candidates) if sizes else [],
             masked=evidence.masked,
             split=prepared.scene.split.text(),
-            notes=[
-                *evidence.notes,
-                *about_frames(prepared),
-                *about_drifts(evidence, kept.config),
-            ],
+            notes=[*evidence.notes, *about_frames(prepared), *about_drifts(evidence, kept.config)],
             model=as_found(of_frames_again(kept.config, given) if known else kept.config),
             facts={
                 "sensor": f"{evidence.width}x{evidence.height}",

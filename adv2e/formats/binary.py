@@ -590,10 +590,7 @@ def open_raw(path: Path, facts: Facts) -> EventFile:
     geometry = header.values.get("geometry", "").partition("x")
     header.tell(
         facts,
-        (
-            _size(options.get("width") or geometry[0]),
-            _size(options.get("height") or geometry[2]),
-        ),
+        (_size(options.get("width") or geometry[0]), _size(options.get("height") or geometry[2])),
     )
     begin = header.t0
 

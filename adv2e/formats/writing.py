@@ -310,11 +310,7 @@ class Sink:
 
     @contextmanager
     def _opened(
-        self,
-        writer: Callable[..., Writer],
-        staging: Staging,
-        temporary: list[Path],
-        is_alone: bool,
+        self, writer: Callable[..., Writer], staging: Staging, temporary: list[Path], is_alone: bool
     ) -> Iterator[Writer]:
         with staging if is_alone else nullcontext(), _closing() as stack:
             with writing(self._name):

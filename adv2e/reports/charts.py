@@ -228,11 +228,7 @@ def _joined(xs: Floats, ys: Floats) -> str:
 # ---- The errors before and after, beside the floor, as bars that are as wide as the page.
 
 
-_MEANINGS = {
-    "before": "declared model",
-    "after": "model found",
-    "floor": "chance alone",
-}
+_MEANINGS = {"before": "declared model", "after": "model found", "floor": "chance alone"}
 """Meaning of each bar: its model, or chance."""
 
 

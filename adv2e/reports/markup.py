@@ -106,8 +106,7 @@ def table(
 
 def _one(caption: str, columns: Sequence[Column], rows: Sequence[Sequence[object]]) -> Markup:
     head = tag(
-        "tr",
-        *(tag("th", column.heading, scope="col", class_=_class(column)) for column in columns),
+        "tr", *(tag("th", column.heading, scope="col", class_=_class(column)) for column in columns)
     )
     body = [_row(columns, row) for row in rows]
     content = tag("table", tag("caption", caption), tag("thead", head), tag("tbody", *body))

@@ -60,12 +60,7 @@ class Fitter:
     """
 
     def __init__(
-        self,
-        sampler: Sampler,
-        scale: Scale,
-        observed: Array,
-        view: int,
-        sd: Array | None = None,
+        self, sampler: Sampler, scale: Scale, observed: Array, view: int, sd: Array | None = None
     ) -> None:
         self._sampler, self.scale, self._view = sampler, scale, view
         self._whitening = scale.whitening if sd is None else scale.whitening / sd

@@ -110,9 +110,7 @@ def maps_of(
 
     return [
         ResidualMap(
-            f"{name} events: measured minus simulated",
-            excess_of(on, before),
-            excess_of(on, after),
+            f"{name} events: measured minus simulated", excess_of(on, before), excess_of(on, after)
         )
         for name, on in _POLARITIES
     ]

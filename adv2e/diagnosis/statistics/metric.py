@@ -228,10 +228,7 @@ class Ensemble:
         """Return the misfit, and the largest deviation, that have this probability or less."""
         misfits, largest = self._left_out
         share = 0.5 * probability  # the smaller of two decides
-        return (
-            _value(misfits, share, _log_normal_value),
-            _value(largest, share, _gumbel_value),
-        )
+        return (_value(misfits, share, _log_normal_value), _value(largest, share, _gumbel_value))
 
 
 def _value(sample: Array, share: float, beyond: Callable[[Array, float], float]) -> float:

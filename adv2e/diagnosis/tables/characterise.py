@@ -16,15 +16,7 @@ from adv2e.diagnosis.tables.table import Latencies, Table, measurements_of
 from adv2e.errors import DataError
 from adv2e.files.regular import shown
 from adv2e.reports.markup import OF_TABLES
-from adv2e.reports.result import (
-    Band,
-    Curve,
-    Diagnosis,
-    ErrorRow,
-    Estimate,
-    Finding,
-    Rejected,
-)
+from adv2e.reports.result import Band, Curve, Diagnosis, ErrorRow, Estimate, Finding, Rejected
 
 _REMARKS = {
     "consistent": "The declared model fits the table within its errors: keep that model as it is.",

@@ -10,14 +10,7 @@ from numpy.typing import NDArray
 
 from adv2e.config.model import Pixel, Sampling
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
-from adv2e.diagnosis.tables.problem import (
-    Array,
-    Declared,
-    Problem,
-    Settings,
-    of_one,
-    row_errors,
-)
+from adv2e.diagnosis.tables.problem import Array, Declared, Problem, Settings, of_one, row_errors
 from adv2e.diagnosis.tables.table import Latencies
 from adv2e.effects.pixel.initial_reference import SETTLED
 from adv2e.effects.pixel.log_response import LogResponse

@@ -45,11 +45,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.tables.threshold_noise import (
-    HIGHEST,
-    SAMPLING_SHIFT,
-    event_rates,
-)
+from adv2e.diagnosis.tables.threshold_noise import HIGHEST, SAMPLING_SHIFT, event_rates
 from adv2e.effects.hooks import LONGEST_US
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
 from adv2e.effects.pixel.thresholds import FLOOR

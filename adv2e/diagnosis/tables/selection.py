@@ -234,11 +234,7 @@ class Selector:
         return self.problem.predict(joint.settings(point))
 
     def _fit(
-        self,
-        joint: Candidate,
-        rows: NDArray[np.bool_],
-        starts: Sequence[Array],
-        tolerance: float,
+        self, joint: Candidate, rows: NDArray[np.bool_], starts: Sequence[Array], tolerance: float
     ) -> tuple[Array, float]:
         def residuals(logs: Array) -> Array:
             gap = (self.problem.measured - self.predicted(joint, logs)) / self.problem.error
@@ -266,10 +262,7 @@ def _borders(joint: Candidate) -> Array:
 
 
 def _rejected(
-    tried: list[list[FittedSet]],
-    before: FittedSet,
-    after: FittedSet,
-    alternatives: list[FittedSet],
+    tried: list[list[FittedSet]], before: FittedSet, after: FittedSet, alternatives: list[FittedSet]
 ) -> list[Rejected]:
     """Return the rejected sets with reasons; of two and more effects, the best of each size."""
     out = []

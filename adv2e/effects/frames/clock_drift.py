@@ -20,11 +20,9 @@ from __future__ import annotations
 
 from adv2e.effects.hooks import Frames, Hooks
 
-LABELS = {
-    "clock_drift": "drift of the frames' clock",
-}
+LABELS = {"clock_drift": "drift of the frames' clock"}
 SEPARATED_BY = {
-    "clock_drift": "a long recording: the delay between frames and events grows steadily",
+    "clock_drift": "a long recording: the delay between frames and events grows steadily"
 }
 
 

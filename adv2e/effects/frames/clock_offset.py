@@ -21,11 +21,9 @@ from __future__ import annotations
 
 from adv2e.effects.hooks import Frames, Hooks
 
-LABELS = {
-    "clock_offset": "offset of the frames' clock",
-}
+LABELS = {"clock_offset": "offset of the frames' clock"}
 SEPARATED_BY = {
-    "clock_offset": "fast and slow motion: the delay is the same for all pixels, speeds and light",
+    "clock_offset": "fast and slow motion: the delay is the same for all pixels, speeds and light"
 }
 
 

@@ -48,12 +48,8 @@ from numpy.typing import NDArray
 from adv2e.effects.hooks import Frames, Hooks
 from adv2e.kernel.effect_loops import sharpen
 
-LABELS = {
-    "exposure_blur": "exposure of the frames",
-}
-SEPARATED_BY = {
-    "exposure_blur": "small, fast features at two exposure times",
-}
+LABELS = {"exposure_blur": "exposure of the frames"}
+SEPARATED_BY = {"exposure_blur": "small, fast features at two exposure times"}
 
 Array = NDArray[np.float64]
 

@@ -29,11 +29,9 @@ from numpy.typing import NDArray
 from adv2e.effects.hooks import Hooks, Times
 from adv2e.parameters import Fit, Section, parameter
 
-LABELS = {
-    "flicker": "flicker of lamps",
-}
+LABELS = {"flicker": "flicker of lamps"}
 SEPARATED_BY = {
-    "flicker": "the same scene by daylight or direct current: the line in the rate disappears",
+    "flicker": "the same scene by daylight or direct current: the line in the rate disappears"
 }
 
 _STEPS_PER_PERIOD = 100

@@ -21,9 +21,7 @@ from adv2e.events import Events
 from adv2e.kernel import rng
 from adv2e.parameters import Fit, Section, parameter
 
-SEPARATED_BY = {
-    "dead_pixels": "a texture moved across the whole sensor: some pixels stay silent",
-}
+SEPARATED_BY = {"dead_pixels": "a texture moved across the whole sensor: some pixels stay silent"}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,12 +37,10 @@ from adv2e.kernel import rng
 from adv2e.kernel.effect_loops import EVENTS, NOBODY, Channel, Requests, serve
 from adv2e.parameters import Fit, Section, parameter
 
-LABELS = {
-    "readout": "time that the readout takes",
-}
+LABELS = {"readout": "time that the readout takes"}
 SEPARATED_BY = {
     "readout": "strong motion of the whole picture: delays grow with the rate of all pixels, and"
-    " events come row by row",
+    " events come row by row"
 }
 
 

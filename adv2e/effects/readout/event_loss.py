@@ -22,12 +22,10 @@ from adv2e.events import Events, pixels_of
 from adv2e.kernel import rng
 from adv2e.parameters import Fit, Section, parameter
 
-LABELS = {
-    "event_loss": "lost events",
-}
+LABELS = {"event_loss": "lost events"}
 SEPARATED_BY = {
     "event_loss": "motion of a small and of a large part of the picture: a share that is lost"
-    " everywhere does not depend on the rate",
+    " everywhere does not depend on the rate"
 }
 
 

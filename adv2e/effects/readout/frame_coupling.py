@@ -49,11 +49,9 @@ from numpy.typing import NDArray
 from adv2e.effects.hooks import Frames, Hooks, Times, View
 from adv2e.parameters import Fit, Section, parameter
 
-LABELS = {
-    "frame_coupling": "disturbance by the readout of frames",
-}
+LABELS = {"frame_coupling": "disturbance by the readout of frames"}
 SEPARATED_BY = {
-    "frame_coupling": "a scene at rest at two frame rates: the bursts stay with the frames",
+    "frame_coupling": "a scene at rest at two frame rates: the bursts stay with the frames"
 }
 
 _STEPS_PER_TAU = 12
