@@ -377,7 +377,6 @@ _complaint = lru_cache(maxsize=1)(Proof.complaint)
 
 
 def _workers(count: int) -> Workers:
-    """Return the processes of this worker."""
     with _lock:
         if not _processes:
             workers = Workers(count)

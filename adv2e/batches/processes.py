@@ -123,12 +123,7 @@ def run(jobs: Iterable[Job], count: int) -> Iterator[tuple[Job, dict[str, Any]]]
 
 
 class Workers(signals.Unfinished):
-    """Processes, each of which does one job after the other.
-
-    Parameters
-    ----------
-    count : int
-    """
+    """Processes, each of which does one job after the other."""
 
     def __init__(self, count: int) -> None:
         self._free: queue.SimpleQueue[_Worker] = queue.SimpleQueue()

@@ -135,7 +135,6 @@ class Batch:
     ----------
     source, dest : Path
         Where sequences are, and where the same tree of events is made.
-    settings : Settings
     layout : str
         Which sequences count; see :mod:`adv2e.batches.sequences`.
     shard : (int, int), optional
@@ -537,7 +536,6 @@ def _record(task: Task, wanted: Wanted, job: Job, found: Mapping[str, Any]) -> d
 
 
 def error_of(record: Mapping[str, Any]) -> str:
-    """Return the error of a sequence, "" without."""
     wrong: str = record.get("error") or record.get("export_error") or ""
     return wrong
 
@@ -587,7 +585,6 @@ def forecast(tasks: Sequence[Task], job_of: Callable[[Task], Job], jobs: int) ->
 
     Parameters
     ----------
-    tasks : sequence of Task
     job_of : callable
         Returns the conversion of a task.
     jobs : int

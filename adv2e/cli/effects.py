@@ -76,7 +76,6 @@ def _wrapped(begin: str, text: str) -> str:
 
 
 def _keys(effect: Effect) -> list[Key]:
-    """Return the keys of `effect` and its sections."""
     from adv2e.config import all_keys
 
     below = tuple(f"{path}." for path in effect.paths)

@@ -75,7 +75,6 @@ def warnings_for_people() -> Iterator[None]:
 
 
 def _joined(error: BaseException) -> str:
-    """Return the message of an exception in one line."""
     return " ".join(str(error).split())
 
 

@@ -44,7 +44,6 @@ class Key:
 
     @property
     def is_section(self) -> bool:
-        """True if the key is a section, with keys of its own."""
         return issubclass(self.kind, Section)
 
 

@@ -246,7 +246,6 @@ def _all_numbers(section: type[Section], path: str = "") -> Iterator[Key]:
 
 
 def _parsed(key: Key, value: Value) -> _Law | _Tie:
-    """Return the distribution that is written at a key."""
     content = value.content
     assert isinstance(content, dict)
     if key.path == "seed":

@@ -142,9 +142,8 @@ def _plain(value: Any) -> Any:
 
 def to_yaml(config: Config) -> str:
     """Return the configuration as YAML that reads back as an equal one."""
-    return "".join(
-        f"{line}\n" for line, _ in _lines(type(config), config, "", "", {}) if not _is_comment(line)
-    )
+    lines = (line for line, _ in _lines(type(config), config, "", "", {}))
+    return "".join(f"{line}\n" for line in lines if not line.lstrip().startswith("#"))
 
 
 def to_annotated_yaml(config: Config, forms: Mapping[str, str] | None = None) -> str:
@@ -195,10 +194,6 @@ def _text(key: Key, value: Any, forms: Mapping[str, str]) -> str:
         parts = zip(parts_of(key), value, strict=True)
         return f"[{', '.join(_text(part, number, forms) for part, number in parts)}]"
     return forms.get(key.path) or scalar_text(value)
-
-
-def _is_comment(line: str) -> bool:
-    return line.lstrip().startswith("#")
 
 
 def _note(key: Key) -> str:

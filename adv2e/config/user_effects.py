@@ -147,7 +147,6 @@ def _line(effect: type[Hooks], source: bytes) -> int:
 
 
 def _complaint(effect: type[Hooks]) -> str | None:
-    """Return the error in the declaration of an effect, or None."""
     if not re.fullmatch(r"[a-z]\w*", effect.name):
         return f"name: must be lower-case letters, digits and underscores, got {effect.name!r}"
     if effect.stage not in STAGES:

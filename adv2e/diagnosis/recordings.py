@@ -104,7 +104,9 @@ def diagnose_file(
     reading = chosen(EventInput, options)
     del reading["size"]  # that of the sensor is in the configuration
     check_names(without, names(declared))
-    _check_own_names(declared)
+    for one in user_effects(declared):
+        if one in names():
+            raise UsageError(f"--effect: {one}: a built-in effect has that name; choose another")
     declared = without_user_effects(declared, written)
     if output is not None:
         inputs = [recording, *([] if light is None else [light]), *also_read]
@@ -124,7 +126,7 @@ def diagnose_file(
             free_thresholds=options["fit_thresholds"],
             threads=options["threads"],
             written=written,
-            progress=lambda now: tell(now.stage, now.simulations),
+            progress=tell,
             log=log,
         )
     if output is not None:
@@ -181,11 +183,3 @@ def check_names(without: Sequence[str], known: Sequence[str]) -> None:
             near = difflib.get_close_matches(name, known, n=1)
             hint = f"did you mean '{near[0]}'?" if near else f"one of {', '.join(known)}"
             raise UsageError(f"--without {name}: no such effect, {hint}")
-
-
-def _check_own_names(config: Config) -> None:
-    """Raise UsageError for an effect of the user's own that has the name of a built-in one."""
-    known = names()
-    for name in user_effects(config):
-        if name in known:
-            raise UsageError(f"--effect: {name}: a built-in effect has that name; choose another")

@@ -106,5 +106,4 @@ def _declared(name: str, table: str) -> str:
 
 
 def named() -> dict[str, Effect]:
-    """Return the effects by all of their names."""
     return {name: effect for effect in EFFECTS for name in (effect.name, *effect.told_as)}

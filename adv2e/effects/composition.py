@@ -31,7 +31,6 @@ COURSES: dict[str, tuple[str, int | None, np.ufunc]] = {
 
 
 def overrides(hook: Hooks, method: str) -> bool:
-    """Tell whether `hook` has a `method` of its own."""
     return getattr(type(hook), method) is not getattr(Hooks, method)
 
 

@@ -49,7 +49,6 @@ class InOrder:
             yield events[:keep]
 
     def rest(self) -> Events:
-        """Return the events still held."""
         rest = empty_events() if self._held is None else self._held
         self._held = rest[:0]
         return rest

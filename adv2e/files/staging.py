@@ -108,7 +108,6 @@ class Staging(signals.Unfinished):
 
         Parameters
         ----------
-        path : Path
         foreign : callable
             Names something in a folder that must not be lost by replacing it, or None.
 
@@ -274,7 +273,6 @@ class Staging(signals.Unfinished):
 
 
 def _identity_of(path: Path) -> Identity | None:
-    """Return the identity of the file or folder at `path`; None: there is none."""
     try:
         status = path.lstat()
     except OSError:

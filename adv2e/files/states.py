@@ -106,7 +106,6 @@ def check_distinct(output: str | Path, inputs: Iterable[str | Path]) -> None:
 
     Parameters
     ----------
-    output : str or Path
     inputs : iterable of str or Path
         All files that are read, and folders; names of nothing do not matter.
 

@@ -473,7 +473,6 @@ class Aedat4Writer(Writer):
         self._held = 0
 
     def _write_frames(self, until_us: int | None) -> None:
-        """Write the frames up to a time, or all."""
         while len(self._frames) and (until_us is None or self._frames.time(0) <= until_us):
             t_us = self._frames.time(0)
             image = self._frames.take()

@@ -114,7 +114,6 @@ class _Cursor:
 
     Parameters
     ----------
-    data : bytes
     is_cdr : bool
         It is of ROS 2.
     label : str
@@ -159,11 +158,6 @@ class _Cursor:
         stamp = seconds * NS_PER_S + self.number("I")
         self.string()
         return stamp
-
-
-def read_stamp(data: bytes, is_cdr: bool, label: str) -> int:
-    """Return the time in the header of a message [ns]."""
-    return _Cursor(data, is_cdr, label).stamp_ns()
 
 
 def read_event_array(data: bytes, is_cdr: bool, label: str) -> EventMessage:
@@ -499,7 +493,7 @@ class _Bag:
         for number, (time, data) in enumerate(self._messages(self.images)):
             self._times.append(time)
             label = f"{self._path}: {self.images.name} message {number}"
-            t_ns = read_stamp(data, not self.is_ros1, label)
+            t_ns = _Cursor(data, not self.is_ros1, label).stamp_ns()
             check_time(t_ns, label)
             yield t_ns, label
 
@@ -595,11 +589,9 @@ class _BagWriter(Writer):
         }
 
     def _opened(self, path: Path) -> Any:
-        """Return a writer of the package."""
         raise NotImplementedError
 
     def _types(self) -> Any:
-        """Return the definitions of the messages."""
         from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: PLC0415
 
         types = get_typestore(Stores.ROS2_HUMBLE if self._is_cdr else Stores.ROS1_NOETIC)

@@ -180,7 +180,6 @@ class CsvWriter(Writer):
 
 
 def _lines(events: Events) -> bytes:
-    """Return the lines of some events."""
     numbers, triples = _tables()
     t = events["t"]
     left = np.abs(t)

@@ -235,7 +235,6 @@ class Layout:
         ]
 
     def _stack(self, file: h5py.File) -> h5py.Dataset | None:
-        """Return the dataset of the frames; None: there are none."""
         if hdf5.find(file, self.frames) is None:
             return None
         stack = hdf5.dataset(file, self.frames)
@@ -254,7 +253,6 @@ class Layout:
 
 
 def _whole(values: NDArray[Any], label: str) -> NDArray[Any]:
-    """Return coordinates as whole numbers."""
     if values.dtype.kind != "f":
         return values
     values = np.rint(values.astype(np.float64))

@@ -196,7 +196,6 @@ class Hdf5Writer(Writer):
         return np.stack([self._stored(name, events) for name in self.layout.order], axis=1)
 
     def _stored(self, name: str, events: Events) -> Values:
-        """Return a column of some events as the layout has it."""
         if name == "t":
             return (
                 self.times_us(events) / 1e6 if self.layout.unit_ns == S else self.times_us(events)

@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from adv2e.causes import CAUSED_DTYPE
 from adv2e.errors import DataError
 from adv2e.events import Events
-from adv2e.files.zips import Header, open_member, read_array, read_header, zip_archive
+from adv2e.files.zips import Header, numpy_archive, open_member, read_array, read_header
 from adv2e.formats.columns import SIZE_NAMES, find_columns, stated_unit
 from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.formats.writing import Request, Writer, to_json
@@ -66,7 +66,7 @@ def open_npz(path: Path, facts: Facts) -> EventFile:
         Not such an archive, a column is missing, or columns differ in length; from `parts`: they
         hold no whole numbers.
     """
-    with _archive(path) as archive:
+    with numpy_archive(path) as archive:
         headers = _headers(archive)
         held = {
             name: _read(archive, name)
@@ -135,12 +135,7 @@ def _file(
     return EventFile(layout, facts, parts, unit_ns=unit.ns, times=time)
 
 
-def _archive(path: Path) -> Any:
-    return zip_archive(path, "a NumPy archive")
-
-
 def _headers(archive: zipfile.ZipFile) -> dict[str, Header]:
-    """Return the headers of all arrays by their names."""
     headers = {}
     for member in archive.infolist():
         if member.filename.endswith(".npy"):
@@ -171,7 +166,7 @@ def _parts_of(
     path: Path, table: str, names: tuple[str, ...], count: int
 ) -> Iterator[tuple[NDArray[Any], ...]]:
     """Yield the columns, as :func:`_rows`."""
-    with _archive(path) as archive, ExitStack() as stack:
+    with numpy_archive(path) as archive, ExitStack() as stack:
         streams = {}
         for name in [table] if table else names:
             file = stack.enter_context(open_member(archive, f"{name}.npy"))
@@ -237,13 +232,13 @@ def _whole(label: str, name: str, column: NDArray[Any]) -> NDArray[np.int64]:
 
 def causes_of(path: Path) -> Callable[[], NDArray[Any]] | None:
     """Return a function that reads the causes of the events, None if the archive has none."""
-    with _archive(path) as archive:
+    with numpy_archive(path) as archive:
         there = f"{_CAUSES}.npy" in archive.namelist()
     return partial(_read_causes, path) if there else None
 
 
 def _read_causes(path: Path) -> NDArray[Any]:
-    with _archive(path) as archive:
+    with numpy_archive(path) as archive:
         causes = _read(archive, _CAUSES)
     if causes.ndim != 1:
         raise DataError(f"{path}: {_CAUSES} must be a column, not of shape {causes.shape}")

@@ -76,7 +76,6 @@ class Intervals:
     ----------
     t_ns, first : int, (rows, columns)
         Time and light, or grey values, of the first frame.
-    sampling : Sampling
     threads : int
         For interpolations that take their time.
     """
@@ -124,7 +123,6 @@ class Intervals:
             yield self._part(len(self._instants) - 1)
 
     def _checked(self, frames: Iterator[Timed]) -> Iterator[Timed]:
-        """Yield the frames as they are."""
         number, before_ns = 0, self._first[0]
         for number, (now_ns, now) in enumerate(frames, start=1):
             if now_ns <= before_ns:

@@ -344,7 +344,6 @@ def _bend(own: Plane, others: Plane, motion: Motion, spans: tuple[float, float])
 
 
 def _between(value: NDArray[Any], low: float, high: float) -> NDArray[Any]:
-    """Return 0 up to `low`, 1 from `high` on."""
     return np.clip((value - low) / (high - low), 0.0, 1.0)
 
 

@@ -212,7 +212,6 @@ def add(thing: Unfinished) -> None:
 
 
 def drop(thing: Unfinished) -> None:
-    """Forget `thing`, if it is known at all."""
     _listed.pop(id(thing), None)
 
 

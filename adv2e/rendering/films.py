@@ -295,12 +295,10 @@ class Film:
         return number
 
     def add(self, number: int, cell: Cell) -> None:
-        """Append the cell."""
         scale = self._scale or default_scale(cell.panels[0].shape[1])
         self._file.add(compose(cell, scale, self._style))
 
     def finish(self) -> None:
-        """Complete the file."""
         self._file.finish()
 
     def close(self) -> None:
@@ -331,7 +329,6 @@ class Sheet:
         return -(-(number + 1) // self._stride) * self._stride - 1
 
     def add(self, number: int, cell: Cell) -> None:
-        """Take the cell."""
         self._cells[number] = cell
         while (number + 1) // self._stride > _KEPT * self._count:
             self._stride *= 2  # so that those held are among those held before
@@ -349,7 +346,6 @@ class Sheet:
         self._path.write_bytes(data.tobytes())
 
     def close(self) -> None:
-        """Forget the cells."""
         self._cells.clear()
 
 

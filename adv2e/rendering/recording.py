@@ -44,7 +44,6 @@ def render_recording(
 
     Parameters
     ----------
-    recording : Recording
     path : str or Path
         Output.
     style, frames, caption

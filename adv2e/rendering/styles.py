@@ -75,7 +75,6 @@ class Style:
 
     @property
     def colours(self) -> tuple[Colour, Colour]:
-        """The colours of ON and OFF."""
         if self.name == "grey":
             return _grey_levels(GREY_CLIP), _grey_levels(-GREY_CLIP)
         return self.on, self.off
@@ -108,7 +107,6 @@ def draw(events: Events, width: int, height: int, t_us: int, style: Style | None
         Size [pixels].
     t_us : int
         The instant [us].
-    style : Style, optional
 
     Returns
     -------

@@ -38,7 +38,6 @@ class _Frame:
     x: Floats
 
     def line(self, values: Floats) -> str:
-        """Return the path of a curve."""
         xs, ys = points_of(self.x, self.up.place(values))
         return line_path(xs, ys)
 
@@ -274,9 +273,6 @@ def _percent(part: float, whole: float) -> str:
 # ---- Axes: from values to places in a picture, their ticks and labels, and how they are drawn.
 
 
-# ---- Places and labels of the ticks of an axis.
-
-
 def linear_ticks(low: float, high: float, most: int = 6) -> list[float]:
     """Return multiples of 1, 2 or 5 times a power of ten from `low` to `high`, ascending.
 
@@ -360,7 +356,6 @@ class Axis:
         return places
 
     def at(self, value: float) -> float:
-        """Return the position of one value on the axis."""
         return float(self.place(np.asarray(value, dtype=np.float64)))
 
     def ticks(self) -> list[tuple[float, str]]:
@@ -424,7 +419,6 @@ def place_text(x: float, y: float, content: str, **attributes: object) -> Markup
 
 
 def rule(x0: float, y0: float, x1: float, y1: float, class_: str) -> Markup:
-    """Return a straight line."""
     return tag(
         "line", x1=f"{x0:.1f}", y1=f"{y0:.1f}", x2=f"{x1:.1f}", y2=f"{y1:.1f}", class_=class_
     )
@@ -464,9 +458,6 @@ def _apart(ticks: list[tuple[float, str]]) -> list[tuple[float, str]]:
     return kept
 
 
-# ---- Pictures of the sensor (PNG inside the page): events of a short time, and residuals.
-
-
 # ---- Events of a short time as pictures (PNG inside the page), in colours that compare.
 
 
@@ -478,9 +469,7 @@ _LOUD = 0.99
 
 def top_of(snapshot: Snapshot) -> int:
     """Return the number of events of a pixel that has full colour in all pictures."""
-    every = np.concatenate(
-        [one.ravel() for one in (snapshot.measured, snapshot.before, snapshot.after)]
-    )
+    every = np.array([snapshot.measured, snapshot.before, snapshot.after])
     some = every[every > 0]
     return int(np.quantile(some, _LOUD, method="lower")) if some.size else 1
 
@@ -498,11 +487,6 @@ def event_colours(number: NDArray[Any], top: int) -> NDArray[np.uint8]:
     return np.asarray(np.rint(255.0 * light), np.uint8)
 
 
-def event_picture(number: NDArray[Any], top: int, description: str) -> Markup:
-    """Return numbers of OFF and ON events, (2, rows, columns), as an ``img`` element."""
-    return image_of(event_colours(number, top), description)
-
-
 # ---- Residuals over the sensor as pictures (PNG inside the page).
 
 
@@ -514,22 +498,8 @@ CLIP_SD = 5.0
 _WIDTH = 440
 """Width that pictures are enlarged to, at least [pixels]."""
 
-_ANCHORS = np.array(
-    [
-        (5, 48, 97),
-        (33, 102, 172),
-        (67, 147, 195),
-        (146, 197, 222),
-        (209, 229, 240),
-        (247, 247, 247),
-        (253, 219, 199),
-        (244, 165, 130),
-        (214, 96, 77),
-        (178, 24, 43),
-        (103, 0, 31),
-    ],
-    dtype=np.float64,
-)
+_RDBU = "053061 2166ac 4393c3 92c5de d1e5f0 f7f7f7 fddbc7 f4a582 d6604d b2182b 67001f"
+_ANCHORS = np.array([tuple(bytes.fromhex(colour)) for colour in _RDBU.split()], np.float64)
 """ColorBrewer's RdBu turned round: blue below zero, red above; safe for colour-blind readers."""
 _LEVELS = 129
 """Colours in all, an odd number: the middle one is zero."""
@@ -573,6 +543,5 @@ def image_of(picture: Picture, description: str) -> Markup:
 
 
 def colour_bar() -> Markup:
-    """Return the scale of the colours, as a picture."""
     scale = np.linspace(-CLIP_SD, CLIP_SD, _LEVELS)[None].repeat(6, axis=0)
     return map_image(scale, f"Colours from -{CLIP_SD:g} to +{CLIP_SD:g} standard deviations")

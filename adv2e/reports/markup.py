@@ -43,7 +43,6 @@ def tag(name: str, /, *content: object, **attributes: object) -> Markup:
 
     Parameters
     ----------
-    name : str
     *content : object
         Texts and elements, one after the other.
     **attributes : object
@@ -86,8 +85,6 @@ def table(
 
     Parameters
     ----------
-    caption : str
-    columns : sequence of Column
     rows : sequence of sequences
         Texts or markup, one for each column.
     folded_from : int

@@ -62,6 +62,12 @@ class Estimate:
     value: float
     interval: Interval | None = None
 
+    @classmethod
+    def of_draws(cls, values: Sequence[float] | NDArray[np.float64]) -> Estimate:
+        """Return the mean of draws, and the range of their middle 95 %."""
+        low, high = np.quantile(values, [0.025, 0.975])
+        return cls(float(np.mean(values)), (float(low), float(high)))
+
 
 ROLES = ("before", "after", "floor")
 """Of the numbers of an error: declared model, model found, draws of that against each other."""

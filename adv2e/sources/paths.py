@@ -97,7 +97,6 @@ class SensorPath:
 
     @classmethod
     def of(cls, options: SourceOptions) -> SensorPath | None:
-        """Return the path that options say, if they do."""
         kind = options["motion"]
         if kind is None:
             return None
@@ -115,7 +114,6 @@ class SensorPath:
 
     @property
     def duration(self) -> float:
-        """Duration of the path [s]."""
         return PATHS[self.kind][2] if self.duration_s is None else self.duration_s
 
     @property

@@ -102,7 +102,6 @@ class Scene:
 
     @property
     def intervals(self) -> int:
-        """Number of frame intervals."""
         return len(self.slope)
 
     @cached_property
@@ -112,7 +111,6 @@ class Scene:
 
     @property
     def pixels(self) -> int:
-        """Number of pixels."""
         return self.width * self.height
 
     def interval_of(self, t_us: NDArray[np.int64], late_us: float = 0.0) -> NDArray[np.int64]:
@@ -178,7 +176,6 @@ class Placed:
 
     @classmethod
     def of(cls, stream: Stream, scene: Scene) -> Placed:
-        """Find the events of `stream` in `scene`."""
         interval = scene.interval_of(stream.t)
         segment = scene.split.segment_of(stream.t)
         pixel = stream.pixel

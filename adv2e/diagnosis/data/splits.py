@@ -41,7 +41,6 @@ class Split:
 
     @classmethod
     def of(cls, width: int, height: int, start_us: float, stop_us: float) -> Split:
-        """Return the division of a recording."""
         size = max(1, min(_TILE, width // 4, height // 4))
         y, x = np.mgrid[:height, :width] // size
         segment = np.arange(_SEGMENTS)[:, None, None]
@@ -51,7 +50,6 @@ class Split:
 
     @property
     def segments(self) -> int:
-        """Number of segments of time."""
         return len(self.label)
 
     def segment_of(self, t: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -65,7 +63,6 @@ class Split:
         return stream.chosen(np.isin(label, parts))
 
     def share(self, part: int) -> float:
-        """Return the share of pixels and time that a part has."""
         return float(np.mean(self.label == part))
 
     def text(self) -> str:

@@ -63,7 +63,6 @@ class Stimulus:
         return np.stack(columns, axis=1)
 
     def cut(self, rows: slice, columns: slice) -> Stimulus:
-        """Return the stimulus of a rectangle of pixels."""
         return replace(self, region=self.region[rows, columns])
 
     def between(self, start_ns: int, stop_ns: int) -> Stimulus:
@@ -139,7 +138,6 @@ def _between(
 
 
 def _leaps_us(times_ns: NDArray[np.int64], course: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the times [us] at which a course leaps."""
     change = np.abs(np.diff(np.log(np.maximum(course, _DARK_DN))))
     quick = (change > _LEAST_LN) & (np.diff(times_ns) <= _QUICK_NS)
     found: list[int] = []

@@ -158,11 +158,9 @@ class Candidate:
         return self.known or (NOTHING_KNOWN,) * len(self.parameters)
 
     def scaled(self, values: Sequence[float]) -> list[float]:
-        """Return values of the parameters on their fitted scales."""
         return [one.scaled(value) for one, value in zip(self.parameters, values, strict=True)]
 
     def applied(self, config: Config, point: Point) -> Config:
-        """Return `config` with this effect."""
         values = to_dict(config)
         for key, value in self.defaults:
             if get_key(values, key.rpartition(".")[0]) is None:

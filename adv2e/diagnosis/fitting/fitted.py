@@ -68,7 +68,6 @@ class Fitted:
 
     @property
     def config(self) -> Config:
-        """The model with the effect as fitted."""
         return self.at_point(self.point)
 
     def at_point(self, point: Array) -> Config:
@@ -152,7 +151,6 @@ class Axes:
 
     @classmethod
     def of(cls, normal: NDArray[Any]) -> Axes:
-        """Return the axes of a normal matrix."""
         squares, columns = np.linalg.eigh(normal)
         deviation = 1.0 / np.sqrt(np.maximum(squares, 1e-12))
         return cls(columns.T, deviation, np.clip(_REACH * deviation, *_REACHES))

@@ -75,23 +75,10 @@ def curves_of(
     """
     drawn = []
     for kind in (*_between_events(), *_by_place(scene), *_by_time(scene, before)):
-        values = kind.measure(measured)
-        first, second = (
-            _band([kind.measure(one) for one in simulated]) for simulated in (before, after)
-        )
-        drawn.append(
-            Curve(
-                kind.title,
-                kind.x_label,
-                kind.y_label,
-                kind.x,
-                values,
-                first,
-                second,
-                kind.x_log,
-                x_names=kind.x_names,
-            )
-        )
+        axes = kind.title, kind.x_label, kind.y_label, kind.x
+        first, second = (_band([kind.measure(one) for one in some]) for some in (before, after))
+        values = kind.measure(measured), first, second
+        drawn.append(Curve(*axes, *values, kind.x_log, x_names=kind.x_names))
     return drawn
 
 
@@ -148,7 +135,7 @@ def totals_of(
             name,
             unit,
             number(measured),
-            *(_mean([number(one) for one in placed]) for placed in (before, after)),
+            *(Estimate.of_draws([number(one) for one in placed]) for placed in (before, after)),
         )
         for name, unit, number in kinds
     ]
@@ -186,11 +173,6 @@ def snapshot_of(
         return number.reshape(2, scene.height, scene.width)
 
     return Snapshot((first - start) * 1e-6, length * 1e-6, *map(number_of, shown))
-
-
-def _mean(values: Sequence[float]) -> Estimate:
-    low, high = np.quantile(values, [0.025, 0.975])
-    return Estimate(float(np.mean(values)), (float(low), float(high)))
 
 
 def _band(rows: Sequence[Array]) -> Band:
@@ -240,7 +222,7 @@ def _by_place(scene: Scene) -> Iterator[_Axes]:
         np.array(LAGS_MS),
         _lags(scene),
     )
-    borders = row_borders(scene)
+    borders = np.rint(np.linspace(0.0, scene.height, min(scene.height, _MOST_ROWS) + 1))
     row = np.searchsorted(borders, np.arange(scene.pixels) // scene.width, "right") - 1
     rows = _rates(scene, row[None], len(borders) - 1)
     yield _Axes("Rate against row", "row, from the top [pixels]", _PER_PIXEL, borders, rows)
@@ -276,11 +258,6 @@ def _by_time(scene: Scene, before: Sequence[Placed]) -> Iterator[_Axes]:
         borders_s,
         _course(scene, borders_s),
     )
-
-
-def row_borders(scene: Scene) -> Array:
-    """Return the rows at which classes of rows begin, and the end."""
-    return np.rint(np.linspace(0.0, scene.height, min(scene.height, _MOST_ROWS) + 1))
 
 
 def contrast(scene: Scene) -> NDArray[np.float32]:

@@ -341,7 +341,6 @@ class Errors:
 
     @classmethod
     def of(cls, measured: Stream, simulations: Sequence[Stream]) -> Errors:
-        """Return the errors of simulations; NaN if nothing was measured."""
         unit = _norm(measured)
         return cls(
             np.array([_apart(measured, stream, unit) for stream in simulations]),
@@ -364,7 +363,7 @@ def error_rows(before: Errors, after: Errors) -> list[ErrorRow]:
     """
     names = [NAME, *(f"{NAME} over {sigma / 1e3:g} ms" for sigma in SIGMAS_US)]
     first, second, floor = (
-        [_estimate(column) for column in (apart.mean(axis=1), *apart.T)]
+        [Estimate.of_draws(column) for column in (apart.mean(axis=1), *apart.T)]
         for apart in (before.to_measured, after.to_measured, after.between)
     )
     rows = [ErrorRow(*row) for row in zip(names, first, second, floor, strict=True)]
@@ -411,9 +410,3 @@ def _mean_square(apart: Array) -> Array:
     if not apart.size:
         return np.zeros(len(SIGMAS_US))
     return np.asarray((apart * apart).mean(axis=0))
-
-
-def _estimate(values: Array) -> Estimate:
-    """Return the mean, and the range of the middle 95 % of the draws."""
-    low, high = np.quantile(values, [0.025, 0.975])
-    return Estimate(float(values.mean()), (float(low), float(high)))

@@ -93,10 +93,8 @@ class Reference:
 
     Parameters
     ----------
-    sampler : Sampler
     observed : (views, statistics)
         Of the recording.
-    declared : Config
     error : FrameError, optional
         Of the statistics.
     log : callable
@@ -235,7 +233,6 @@ class Reference:
         return Fitted(joint, self.declared, point, reach=_REACH)
 
     def misfit(self, state: State, view: int = BOTH) -> float:
-        """Return the misfit of a model to the recording."""
         return state.ensembles[view].misfit(self.observed[view])
 
     def likelihood(self, state: State, view: int = BOTH) -> float:

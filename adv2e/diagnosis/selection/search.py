@@ -125,7 +125,6 @@ class Search:
         return self._taken_away(self.declared, state, state.ensembles[view].floor, view)
 
     def run(self) -> Outcome:
-        """Search forward and backward."""
         chance = self.probability(self.declared)
         self.reference.log(f"declared model: probability of the residual {chance:.2g}")
         state = self._backward(self._forward(self.declared))

@@ -114,7 +114,6 @@ class Ensemble:
 
     @cached_property
     def mean(self) -> Array:
-        """Mean in compressed deviations."""
         return np.asarray(self.sample.mean(axis=0))
 
     @cached_property
@@ -124,8 +123,14 @@ class Ensemble:
 
     def z(self, values: Array) -> Array:
         """Return z-scores: measured statistics less the mean of this model, in its deviations."""
-        inflation = math.sqrt(1.0 + 1.0 / len(self.sample))
-        return np.asarray((self.scale.of_values(values) - self.mean) / (self.sd * inflation))
+        return self._deviations(self.scale.of_values(values))
+
+    def _deviations(self, compressed: Array) -> Array:
+        return np.asarray((compressed - self.mean) / (self.sd * self._inflation))
+
+    @property
+    def _inflation(self) -> float:
+        return math.sqrt(1.0 + 1.0 / len(self.sample))  # a mean of few is not known well
 
     def misfit(self, values: Array) -> float:
         """Return the mean square of the uncorrelated deviations of measured statistics."""
@@ -145,9 +150,8 @@ class Ensemble:
         """
         z, white = self.z(values), self.scale.whitening
         downhill = white.T @ (white @ z)
-        inflation = math.sqrt(1.0 + 1.0 / len(self.sample))
         apart = (self.sample - self.mean) / self.sd
-        of_mean = apart @ (downhill / inflation)
+        of_mean = apart @ (downhill / self._inflation)
         free = self.sd > _LEAST_SD
         of_sd = 0.5 * (apart**2 - 1.0) @ np.where(free, downhill * z - 1.0, 0.0)
         return np.asarray(of_mean + of_sd)
@@ -209,8 +213,7 @@ class Ensemble:
         As :meth:`probability`, by rank alone: statistics that are small counts of rare events have
         no tail that a curve would fit.  `further`, (seeds, statistics), in compressed deviations.
         """
-        inflation = math.sqrt(1.0 + 1.0 / len(self.sample))
-        z = (further - self.mean) / (self.sd * inflation)
+        z = self._deviations(further)
         white = z @ self.scale.whitening.T
         found = (
             (np.mean(white * white, axis=1), self.misfit(values)),

@@ -42,7 +42,6 @@ class SummaryStatistics:
 
     Parameters
     ----------
-    scene : Scene
     pilot : sequence of Stream
         Simulations of the declared model, from which is known what to expect.
     besides : sequence of Group
@@ -115,8 +114,6 @@ class Sampler:
 
     Parameters
     ----------
-    simulator : Simulator
-    statistics : SummaryStatistics
     bias : (views, statistics)
         Taken off all statistics: what they owe to the interpolation between frames.
     is_rough : bool

@@ -94,7 +94,6 @@ class FrameError:
 
     @classmethod
     def none(cls, shape: tuple[int, ...]) -> FrameError:
-        """Return no error."""
         return cls(np.zeros(shape), np.zeros(shape))
 
     def __add__(self, other: FrameError) -> FrameError:

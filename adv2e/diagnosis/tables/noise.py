@@ -45,7 +45,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.tables.threshold_noise import HIGHEST, SAMPLING_SHIFT, event_rates
+from adv2e.diagnosis.tables.threshold_noise import (
+    HIGHEST,
+    SAMPLING_SHIFT,
+    event_rates,
+    lagrange_weights,
+)
 from adv2e.effects.hooks import LONGEST_US
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
 from adv2e.effects.pixel.thresholds import FLOOR
@@ -288,7 +293,6 @@ class Law:
         Corner of the slower pole [rad/s].
     ratio : float
         Over that of the faster one; 0: there is but one.
-    dead_time_s, leak_hz : float
     shift : float
         How much farther levels are, in standard deviations, as the noise is sampled.
     """
@@ -379,13 +383,7 @@ def _cubic(place: Array, count: int) -> tuple[NDArray[np.int64], list[Array]]:
     """Return the first of four kept values about each place, and their weights (Lagrange)."""
     place = np.clip(place, 0.0, count - 1.0)
     first = np.clip(place.astype(np.int64) - 1, 0, count - 4)
-    t = place - first
-    return first, [
-        -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0,
-        t * (t - 2.0) * (t - 3.0) / 2.0,
-        -t * (t - 1.0) * (t - 3.0) / 2.0,
-        t * (t - 1.0) * (t - 2.0) / 6.0,
-    ]
+    return first, lagrange_weights(place - first)
 
 
 def _laws(sources: NoisySources, light: Array, leak: Array) -> list[Law]:

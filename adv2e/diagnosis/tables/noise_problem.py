@@ -58,10 +58,7 @@ class NoiseProblem(Problem):
 
     Parameters
     ----------
-    data : Noise
-    declared : Declared
     test : (rows,) of bool
-    settings : Settings
 
     References
     ----------

@@ -86,7 +86,6 @@ class FittedSet:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the effects."""
         return tuple(effect.name for effect in self.effects)
 
     @property

@@ -80,7 +80,6 @@ class Table:
         return len(self.rows)
 
     def texts(self, column: str) -> list[str]:
-        """Return the cells of a column."""
         at = self.columns.index(column)
         return [row[at] for row in self.rows]
 
@@ -121,13 +120,11 @@ class Table:
         return float(text.replace(",", ".") if self.decimal_comma else text)
 
     def wrong(self, row: int, column: str, text: str) -> DataError:
-        """Return the error that says `text` of one cell."""
         cell = self.texts(column)[row]
         found = f"{text}, got {cell!r}" if cell else f"is empty, {text}"
         return DataError(f"{self.name}:{self.lines[row]}: {column}: {found}")
 
     def kept(self, keep: Sequence[bool]) -> Table:
-        """Return the table of the rows where `keep` is true."""
         rows = tuple(row for row, use in zip(self.rows, keep, strict=True) if use)
         lines = tuple(line for line, use in zip(self.lines, keep, strict=True) if use)
         return Table(self.name, self.columns, rows, lines, self.decimal_comma)

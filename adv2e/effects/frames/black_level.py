@@ -53,7 +53,6 @@ class BlackLevelHooks(Hooks):
         self._dn, self._depth = dn, depth_dn
 
     def light(self, frames: Frames) -> Frames:
-        """Yield the frames with the constant."""
         for t_ns, light in frames:
             made = light + light.dtype.type(self._dn)
             if self._depth:

@@ -36,7 +36,6 @@ class ClockDriftHooks(Hooks):
         self._ppm = ppm
 
     def light(self, frames: Frames) -> Frames:
-        """Yield the frames at their times."""
         first_ns: int | None = None
         for t_ns, light in frames:
             first_ns = t_ns if first_ns is None else first_ns

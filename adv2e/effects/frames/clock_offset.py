@@ -37,6 +37,5 @@ class ClockOffsetHooks(Hooks):
         self._offset_ns = round(offset_us * 1e3)
 
     def light(self, frames: Frames) -> Frames:
-        """Yield the frames at their times."""
         for t_ns, light in frames:
             yield t_ns + self._offset_ns, light

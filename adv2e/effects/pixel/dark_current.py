@@ -45,6 +45,5 @@ class DarkCurrentHooks(Hooks):
     Parameters = DarkCurrent
 
     def light(self, frames: Frames) -> Frames:
-        """Yield the frames with the constant."""
         for t_ns, light in frames:
             yield t_ns, light + light.dtype.type(self.parameters.dn)

@@ -72,7 +72,6 @@ class ArbiterHooks(Hooks):
     Parameters = Arbiter
 
     def begin(self, view: View) -> None:
-        """Empty the channel."""
         super().begin(view)
         pixels = view.rows * view.columns
         self._channel = Channel(
@@ -87,7 +86,6 @@ class ArbiterHooks(Hooks):
         self._origin_us = round(view.start_s * 1e6)
 
     def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
-        """Yield the events as they leave the channel."""
         asking, order = InOrder(), InOrder()
         for events in chunks:
             if not events.size:

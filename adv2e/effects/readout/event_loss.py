@@ -54,7 +54,6 @@ class EventLossHooks(Hooks):
         self._numbers = np.zeros(view.rows * view.columns, np.int64)
 
     def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
-        """Yield the events that are kept."""
         for events in chunks:
             pixels = pixels_of(events, self.view.columns)
             drawn = rng.next_uniforms(self.view.seed, rng.LOSS, pixels, self._numbers)

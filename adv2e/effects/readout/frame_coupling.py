@@ -111,7 +111,6 @@ class FrameCouplingHooks(Hooks):
 
     Parameters
     ----------
-    parameters : FrameCoupling
     exposed_us : float
         From a frame's time to the end of its exposure.
     every : int
@@ -175,7 +174,6 @@ class FrameCouplingHooks(Hooks):
         self._sums.append(1.0 + left)
 
     def signal(self, times_s: Times) -> NDArray[np.float64]:
-        """Return the disturbance, (n,)."""
         left = self._left(times_s)
         if self._width_s:
             left = left - self._left(times_s - self._width_s)

@@ -203,12 +203,10 @@ class _Picture:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all planes."""
         each = 2 if self.bits > 8 else 1
         return sum(rows * columns * each for rows, columns in self.shapes)
 
     def pixels(self, data: bytes, label: str) -> Pixels:
-        """Return the pixels of a frame."""
         numbers = np.frombuffer(data, "<u2" if self.bits > 8 else "u1")
         planes, at = [], 0
         for rows, columns in self.shapes:
