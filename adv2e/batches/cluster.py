@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING, Any
 from adv2e import __version__
 from adv2e.batches.processes import EndedError, Workers
 from adv2e.batches.work import Job
-from adv2e.errors import Adv2eError, DataError, MissingExtraError, UsageError
+from adv2e.errors import Adv2eError, DataError, MissingExtraError, UsageError, one_line
 from adv2e.files.regular import read_text_bytes
 from adv2e.files.states import state_of
 from adv2e.files.workspace import remove_abandoned
@@ -159,7 +159,7 @@ class Cluster:
             except Exception as error:  # many kinds, where versions of Dask differ
                 raise Adv2eError(
                     f"{self._scheduler}: no scheduler of this Dask answers there:"
-                    f" {type(error).__name__}: {_one_line(error)}"
+                    f" {type(error).__name__}: {one_line(error)}"
                 ) from error
 
     def _run(
@@ -322,12 +322,8 @@ def _found(future: Future, job: Job) -> dict[str, Any] | None:
         return {"error": f"{job.source}: {count} workers ended while they had it"}
     return {  # it could not even begin
         "unfit": f"or the scheduler has no adv2e {__version__}, or another Python or Dask than"
-        f" here: {type(error).__name__}: {_one_line(error)}"
+        f" here: {type(error).__name__}: {one_line(error)}"
     }
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())
 
 
 # ---- what workers run

@@ -72,7 +72,7 @@ def config_of(job: Job) -> Config:
 
 
 def do(job: Job) -> dict[str, Any]:
-    """Do what a job says, and return what the manifest says of it.
+    """Convert and export as a job says; return the record for the manifest.
 
     That holds ``error`` where nothing was made, and ``export_error`` where only events were.
     """

@@ -29,7 +29,7 @@ from typing import TextIO
 
 import click
 
-from adv2e.errors import Adv2eError, Adv2eWarning, is_for_users
+from adv2e.errors import Adv2eError, Adv2eWarning, is_for_users, one_line
 from adv2e.files.regular import shown
 from adv2e.process.machine import machine_complaint
 from adv2e.process.signals import Terminated, last_words
@@ -74,10 +74,6 @@ def warnings_for_people() -> Iterator[None]:
         warnings.showwarning = usual
 
 
-def _joined(error: BaseException) -> str:
-    return " ".join(str(error).split())
-
-
 @contextmanager
 def reporting(context: click.Context | None = None) -> Iterator[None]:
     """Turn what the body raises into a line on stderr and SystemExit.
@@ -118,7 +114,7 @@ def _explained(error: Exception, context: click.Context | None) -> int:
         complain(f"error: {place}{error.strerror or error}")
     else:
         hint = "" if traced else "; run with -vv for the traceback"
-        complain(f"error: internal error: {type(error).__name__}: {_joined(error)}{hint}")
+        complain(f"error: internal error: {type(error).__name__}: {one_line(error)}{hint}")
     return 1
 
 

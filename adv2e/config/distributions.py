@@ -17,7 +17,6 @@ distribution more change what another key gets; and it is the same with every ve
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import hashlib
 import math
 import re
@@ -29,7 +28,7 @@ from typing import Any, TypeAlias
 from adv2e.config.build import Key, keys_of, parts_of
 from adv2e.config.tree import LAWS, TIE, form_text
 from adv2e.config.yaml12 import Value
-from adv2e.errors import Adv2eError
+from adv2e.errors import Adv2eError, did_you_mean
 from adv2e.parameters import Section
 
 Number: TypeAlias = "int | float"
@@ -186,9 +185,8 @@ class Distributions:
         section, tree = self._section, self._tree
         known = {key.path: key for key in _all_numbers(section)}
         if wanted not in known:
-            near = difflib.get_close_matches(wanted, known, n=1)
-            hint = f", did you mean '{near[0]}'?" if near else ""
-            raise self._complaint(path, f"{wanted} is no key of a number{hint}")
+            hint = filter(None, [f"{wanted} is no key of a number", did_you_mean(wanted, [*known])])
+            raise self._complaint(path, ", ".join(hint))
         names, index = re.fullmatch(r"([^\[]+)(?:\[(\d+)\])?", wanted).groups()  # type: ignore[union-attr]
         here: Value | None = tree
         default: Any = MISSING

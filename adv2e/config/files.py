@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 import textwrap
 from collections.abc import Iterator, Mapping
@@ -14,8 +13,8 @@ from typing import Any
 from adv2e.config.build import Key, keys_of, parts_of
 from adv2e.config.model import Config
 from adv2e.config.yaml12 import Origin, Value, parse, scalar_text
-from adv2e.errors import ConfigError
-from adv2e.files.regular import read_text_bytes
+from adv2e.errors import ConfigError, did_you_mean
+from adv2e.files.regular import read_text
 from adv2e.parameters import Section
 
 
@@ -93,11 +92,9 @@ def find(name: str | Path) -> Path:
         known = path.suffix in (".yaml", ".yml") and path.stem in shipped()
         hint = f" (the shipped one: -c {path.stem})" if known else ""
         raise ConfigError(f"{name}: no such file{hint}")
-    near = difflib.get_close_matches(path.name.lower(), shipped(), n=1)
-    hint = f", did you mean '{near[0]}'?" if near else ""
-    raise ConfigError(
-        f"{name}: no such file or shipped configuration{hint} (shipped: {', '.join(shipped())})"
-    )
+    near = did_you_mean(path.name.lower(), shipped())
+    what = ", ".join(filter(None, ["no such file or shipped configuration", near]))
+    raise ConfigError(f"{name}: {what} (shipped: {', '.join(shipped())})")
 
 
 def read(name: str | Path) -> Value:
@@ -109,13 +106,7 @@ def read(name: str | Path) -> Value:
         The file is missing, cannot be read, is not YAML, or is not a mapping of keys.
     """
     path = find(name)
-    try:
-        text = read_text_bytes(path, ConfigError).decode("utf-8-sig")
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: byte {error.start} is not UTF-8 text") from None
-    tree = parse(text, Origin(str(path)))
+    tree = parse(read_text(path, ConfigError), Origin(str(path)))
     if tree.content is None:  # nothing but comments
         return Value({}, tree.origin)
     if not isinstance(tree.content, dict):

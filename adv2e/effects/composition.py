@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from adv2e.causes import CAUSED_DTYPE, FRAME_COUPLING, OWN_EFFECT, with_cause
 from adv2e.effects.hooks import INJECTED_DTYPE, Frames, Hooks, Times, View
-from adv2e.errors import Adv2eError, ConfigError, DataError
+from adv2e.errors import Adv2eError, ConfigError, DataError, one_line
 from adv2e.events import EVENT_DTYPE, Events
 
 Array = NDArray[Any]
@@ -32,11 +32,6 @@ COURSES: dict[str, tuple[str, int | None, np.ufunc]] = {
 
 def overrides(hook: Hooks, method: str) -> bool:
     return getattr(type(hook), method) is not getattr(Hooks, method)
-
-
-def changes_light(hooks: Iterable[Hooks]) -> bool:
-    """Tell whether any of `hooks` has to see the light of the frames."""
-    return any(overrides(hook, "light") for hook in hooks)
 
 
 def begin(hooks: Sequence[Hooks], frames: Frames, seed: int) -> Frames:
@@ -244,5 +239,5 @@ def blamed(hook: Hooks, source: _Watched | None = None) -> Iterator[None]:
         file = str(getattr(sys.modules.get(type(hook).__module__), "__file__", ""))
         lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
         where = f"{file}:{lines[-1]}: " if lines else ""
-        text = " ".join(str(error).split())
-        raise DataError(f"{where}effect {hook.name}: {type(error).__name__}: {text}") from error
+        what = f"effect {hook.name}: {type(error).__name__}"
+        raise DataError(f"{where}{what}: {one_line(error)}") from error

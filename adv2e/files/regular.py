@@ -56,6 +56,16 @@ def read_text_bytes(path: Path, kind: type[Adv2eError] = DataError) -> bytes:
     return data
 
 
+def read_text(path: Path, kind: type[Adv2eError] = DataError) -> str:
+    """Return the UTF-8 text in a file; an error of that kind if it cannot be read as such."""
+    try:
+        return read_text_bytes(path, kind).decode("utf-8-sig")
+    except OSError as error:
+        raise kind(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise kind(f"{path}: byte {error.start} is not UTF-8 text") from None
+
+
 def open_regular(path: Path) -> BinaryIO | None:
     """Return a file, opened to be changed, without buffer; None: it is none, or a link.
 

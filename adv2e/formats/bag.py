@@ -144,7 +144,7 @@ class _Cursor:
         return self.bytes(self.number("I")).rstrip(b"\0").decode("utf-8", "replace")
 
     def bytes(self, count: int) -> bytes:
-        """Return so many bytes."""
+        """Return the next bytes; DataError if the message ends before."""
         if self._at + count > len(self._data):
             raise DataError(f"{self.label}: cut short: states {count:,} bytes")
         self._at += count

@@ -116,7 +116,7 @@ def unit_of_attribute(text: str) -> str | None:
 
 
 def named_geometry(values: Mapping[str, Any]) -> tuple[str, tuple[int, int] | None]:
-    """Return by what name values state the size of a sensor, and (width, height) [pixels].
+    """Return the name by which values state the size of a sensor, and (width, height) [pixels].
 
     None: they state none; the name is empty then.
     """

@@ -49,9 +49,6 @@ COLOURS: dict[str, Colour] = {
 GREY_CLIP = 3
 """Net count at which the grey style is black or white."""
 
-_WHITE = (255, 255, 255)
-_BLACK = (0, 0, 0)
-
 
 @dataclass(frozen=True, kw_only=True)
 class Style:
@@ -71,7 +68,8 @@ class Style:
     @property
     def background(self) -> Colour:
         """The colour of a pixel without events."""
-        return {"black": _BLACK, "grey": _grey_levels(0)}.get(self.name, _WHITE)
+        paper = COLOURS["black" if self.name == "black" else "white"]
+        return _grey_levels(0) if self.name == "grey" else paper
 
     @property
     def colours(self) -> tuple[Colour, Colour]:

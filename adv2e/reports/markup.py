@@ -265,7 +265,7 @@ _UNIT = re.compile("_(us|ns|hz|rad|dn|px|ppm|per_s)$")
 
 
 def heading_of(effect: str) -> str:
-    """Return the same as a heading, with the effect's name where that is another."""
+    """Return the label of an effect as a heading, with the effect's name where that differs."""
     label = label_of(effect)
     heading = f"{label[:1].upper()}{label[1:]}"
     return heading if label == effect.replace("_", " ") else f"{heading} ({effect})"

@@ -136,7 +136,7 @@ class Candidate:
 
     @classmethod
     def joined(cls, each: Sequence[Candidate]) -> Candidate:
-        """Return one of all parameters; it starts at their first starts, their second ones, ..."""
+        """Return one candidate of all parameters; its k-th start joins the k-th start of each."""
         count = max((len(one.starts) for one in each), default=0)
         starts = [
             [value for one in each for value in one.starts[min(k, len(one.starts) - 1)]]
@@ -173,7 +173,7 @@ class Candidate:
         return dict(flat(self._set({}, point)))
 
     def settings_in(self, config: Config, point: Point) -> dict[str, Any]:
-        """Return the same of a model that has it: what was set besides, as it is there.
+        """Return the keys of this effect in a model with it; those not fitted, as they are there.
 
         Where a pulse is, others' keys tell, too.
         """

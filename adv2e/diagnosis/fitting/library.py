@@ -119,7 +119,7 @@ def _now(values: dict[str, Any], key: str) -> float:
 
 
 def _multiples(key: str, value: float) -> list[float]:
-    """Return where the fit of a key begins that is declared with a value."""
+    """Return the starts of a fit as multiples of the declared value."""
     return [factor * value for factor in _fit_of(key).factors]
 
 

@@ -71,7 +71,7 @@ def verdict_of(outcome: Outcome, error: ErrorRow, interpolated: float = 0.0) -> 
 
 
 def _gone(error: ErrorRow, interpolated: float) -> tuple[float, float]:
-    """Return by how much of what it can the error fell, and by how much at most (97.5 %).
+    """Return the fall of the error as a share of the largest possible, and its bound (97.5 %).
 
     One where the error tells nothing of the effect.  Statistics fall for any effect that does some
     of what is missing; events come where they are measured only for those that do it where and when
@@ -307,7 +307,7 @@ class _Size:
 
 
 def _missing(ensemble: Ensemble, recording: NDArray[np.float64]) -> float:
-    """Return by which factor an effect must be larger to be seen in a recording with it."""
+    """Return the factor by which an effect must grow to be detected in a recording with it."""
     misfit_limit, largest_limit = ensemble.limits(PER_LOOK)
     # squares add up, single deviations grow in proportion
     misfit = (ensemble.misfit(recording) - ensemble.floor) / (misfit_limit - ensemble.floor)

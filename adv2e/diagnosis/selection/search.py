@@ -98,7 +98,7 @@ class Search:
         return state.ensembles[view].probability(self.reference.observed[view])
 
     def judged(self, state: State, view: int) -> float:
-        """Return the same, to decide by whether something is left.
+        """Return the probability of the residual, to decide whether another effect is missing.
 
         Where it is so rare that the tail of a curve tells it, further simulations are counted.
         """

@@ -65,11 +65,11 @@ class Simulator:
             self._progress(stage, self.done)
 
     def of(self, evidence: Evidence) -> Simulator:
-        """Return the same for another recording; nobody is told of its progress."""
+        """Return a simulator of another recording, which reports no progress."""
         return Simulator(evidence, self._threads)
 
     def there_and_back(self, config: Config, shift_px: tuple[float, float]) -> Simulator:
-        """Return the same for `config` and frames that were moved by `shift_px` and back."""
+        """Return a simulator of frames that were shifted by `shift_px` and back, for `config`."""
         times_ns, light = self._light(config)
         x, y = shift_px
         moved = np.array([shifted(shifted(one, (x, y)), (-x, -y)) for one in light])

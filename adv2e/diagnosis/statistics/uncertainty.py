@@ -97,7 +97,7 @@ class FrameError:
         return cls(np.zeros(shape), np.zeros(shape))
 
     def __add__(self, other: FrameError) -> FrameError:
-        """Return both errors, which know nothing of each other."""
+        """Return the sum of two independent errors: biases add, deviations in quadrature."""
         return FrameError(self.bias + other.bias, np.hypot(self.sd, other.sd))
 
     def blurred(self, sample: Array, view: int, stream: int) -> Array:

@@ -221,7 +221,7 @@ class Ruler:
         self._along = reach * np.sinh(np.linspace(-8.0, 8.0, 2001)) / np.sinh(8.0)
 
     def place(self, apart: Array) -> Array:
-        """Return at which mark a difference is, 0 at 0."""
+        """Return the mark of a threshold difference; 0 where both are equal."""
         return np.asarray(apart / self._step + np.arcsinh(apart / self._fine))
 
     def marks(self, middle: float = 0.0) -> tuple[Array, Array]:

@@ -46,7 +46,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError, UsageError
-from adv2e.files.regular import read_text_bytes
+from adv2e.files.regular import read_text
 
 DELIMITERS = ",;\t"
 
@@ -172,14 +172,7 @@ def read_table(path: str | Path) -> Table:
         The file cannot be read, has no header or no rows, a name stands twice in the header, or a
         row has another number of cells; file and line are named.
     """
-    path = Path(path)
-    try:
-        text = read_text_bytes(path).decode("utf-8-sig")
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise DataError(f"{path}: byte {error.start} is not UTF-8 text") from None
-    return parse_table(text, str(path))
+    return parse_table(read_text(Path(path)), str(Path(path)))
 
 
 def parse_table(text: str, name: str) -> Table:

@@ -199,7 +199,7 @@ class FrameCouplingHooks(Hooks):
         return left
 
     def longest_step_us(self, start_s: float, stop_s: float) -> float:
-        """Return its step, and no limit where the disturbance has decayed."""
+        """Return the step that resolves the disturbance [us]; no limit once it has decayed."""
         backs = (0.0, self._width_s) if self._width_s else (0.0,)
         return min(self._step_us(start_s - back, stop_s - back) for back in backs)
 

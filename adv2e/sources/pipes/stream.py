@@ -116,7 +116,7 @@ class Stream:
         return self._seen
 
     def read(self, size: int) -> bytes:
-        """Return so many bytes, fewer only where it ends; those that never come take no memory."""
+        """Return the next `size` bytes, fewer at the end; those that never come take no memory."""
         pieces, self._seen = [self._seen[:size]], self._seen[size:]
         left = size - len(pieces[0])
         while left and (piece := self._some(min(left, _PIECE))):
