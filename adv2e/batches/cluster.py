@@ -63,7 +63,6 @@ class Proof:
         Of adv2e.
     manifest : str
         The file in DEST.
-    bytes : int
     sha256 : str
         Of that many bytes at its start, among which are lines of this run.
     """

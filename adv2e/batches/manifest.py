@@ -146,7 +146,6 @@ class Manifest:
             raise
 
     def _cut(self) -> None:
-        """Cut off a last line that is torn."""
         self._file.seek(0)
         for _ in _lines(self.path, self._file):
             pass
@@ -156,7 +155,6 @@ class Manifest:
 
 
 def _lines(path: Path, file: BinaryIO) -> Iterator[dict[str, Any]]:
-    """Yield the record of each whole line."""
     for number, line in enumerate(file, start=1):
         record = _record(line)
         if record is not None:

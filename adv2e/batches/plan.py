@@ -21,11 +21,8 @@ class Task:
 
     Attributes
     ----------
-    sequence : Sequence
     state : State
         Of its source.
-    output : Path
-    seed : int
     why : str
         Why something is made; empty: all is kept.
     record : mapping, optional
@@ -51,7 +48,6 @@ class Wanted:
 
     Attributes
     ----------
-    dest : Path
     suffix : str
         Of the files; empty: folders.
     seed : int

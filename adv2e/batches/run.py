@@ -119,12 +119,10 @@ class Outcome:
 
     @property
     def made(self) -> int:
-        """Sequences that were converted now."""
         return sum(bool(task.why) for task in self.tasks) - len(self.failed)
 
     @property
     def kept(self) -> int:
-        """Sequences whose files were kept."""
         return sum(not task.why for task in self.tasks)
 
 
@@ -213,7 +211,6 @@ class Batch:
     def forecast(
         self, tasks: Sequence[Task], jobs: int | None, threads: int | None
     ) -> Estimate | None:
-        """Return an estimate of the conversion; `jobs` and `threads` as for :meth:`run`."""
         waiting = [task for task in tasks if task.why and not task.only_export]
         count, each = _shares(len(waiting), jobs, threads)
 

@@ -224,7 +224,6 @@ class _Walk:
 
 
 def _is_stack(path: Path) -> bool:
-    """Tell whether a TIFF has several pages."""
     try:
         return len(Pages(path)) > 1
     except DataError:

@@ -110,7 +110,6 @@ def _pattern(paths: Sequence[str]) -> str:
 
 
 def _without(given: Sequence[str], left_out: Sequence[str]) -> list[str]:
-    """Return the options among the arguments, quoted."""
     rest = list(given)
     for text in left_out:
         del rest[_last(rest, text)]

@@ -113,7 +113,6 @@ def command(
 
 
 def _configured() -> bool:
-    """Tell whether a configuration was asked for on the command line."""
     given = click.get_current_context().params
     layers = (given["config_files"], given["sets"], given["effect_files"])
     return any(layers) or given["seed"] is not None

@@ -42,7 +42,6 @@ _FORMS = (
 
 
 def replaced(tree: Value, by: Mapping[str, Value], path: str = "") -> Value:
-    """Return `tree` with other values at some paths."""
     if path in by:
         return by[path]
     content = tree.content

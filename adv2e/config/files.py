@@ -29,7 +29,6 @@ def shipped_folder() -> Path:
 
 
 def shipped() -> list[str]:
-    """Return the names of the shipped configurations, sorted."""
     return sorted(path.stem for path in shipped_folder().glob("*.yaml"))
 
 

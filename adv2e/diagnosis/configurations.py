@@ -34,7 +34,6 @@ def from_values(values: dict[str, Any], name: str, like: Config) -> Config:
 
 
 def coupling_of(config: Config) -> FrameCoupling | None:
-    """Return the coupling of the frame readout to the pixels; None: the configuration has none."""
     return None if config.readout is None else config.readout.frame_coupling
 
 
@@ -98,7 +97,6 @@ def own_of(config: Config) -> Own:
 
 
 def _file_of(effect: type) -> str:
-    """Return the path of the file that defines an effect, "" where it is in no file."""
     return str(getattr(sys.modules.get(effect.__module__), "__file__", None) or "")
 
 

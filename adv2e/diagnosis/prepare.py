@@ -48,11 +48,8 @@ class Prepared:
 
     Attributes
     ----------
-    evidence : Evidence
-    scene : Scene
     reference : Reference
         Of the declared model, with thresholds that match the totals where they were not known.
-    candidates : list of Candidate
     between_frames, between_levels : FrameError, optional
         Of the statistics; None: too few frames to tell, and levels too fine to matter.
     """

@@ -176,7 +176,6 @@ def _stages(shown: bool, say: Callable[[str], None] | None) -> Iterator[Callable
 
 
 def check_names(without: Sequence[str], known: Sequence[str]) -> None:
-    """Raise UsageError for an effect that is not known."""
     for name in without:
         if name not in known:
             hint = did_you_mean(name, known) or f"one of {', '.join(known)}"

@@ -97,7 +97,6 @@ def _adding(hooks: Sequence[Hooks]) -> list[Hooks]:
 
 
 def _is_own(hook: Hooks) -> bool:
-    """Tell whether an effect is the user's own."""
     return not type(hook).__module__.startswith("adv2e.")
 
 

@@ -51,7 +51,6 @@ class _Output:
 
     @property
     def is_placed(self) -> bool:
-        """True if the output that was written has the final name."""
         return self.identity is not None and _identity_of(self.final) == self.identity
 
 

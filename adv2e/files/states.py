@@ -41,7 +41,6 @@ class State:
 
 
 def state_of(path: Path) -> State:
-    """Return the state of a file, or of a folder with all below it."""
     found = [file.stat() for _, file in _files(path)]
     return State(
         sum(one.st_size for one in found),

@@ -180,8 +180,6 @@ class Header:
 
     Attributes
     ----------
-    dtype : numpy.dtype
-    shape : tuple of int
     fortran : bool
         The first index runs fastest.
     begin : int

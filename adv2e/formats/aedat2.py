@@ -279,8 +279,7 @@ def _load(path: Path, begin: int, frame: _Frame, size: tuple[int, int]) -> Pixel
 class Aedat2Writer(Writer):
     """Writes the events of a DAVIS in AEDAT-2.0; see :class:`Writer`."""
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        (path,) = temporary
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._file = stack.enter_context(path.open("wb"))
         self._last = request.width - 1, request.height - 1
         chip = _WRITTEN.get((request.width, request.height))

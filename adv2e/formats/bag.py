@@ -66,7 +66,7 @@ from adv2e.files.staging import Staging
 from adv2e.formats.binary import DECODERS
 from adv2e.formats.clock import shots_in_order
 from adv2e.formats.event_file import MOST_COLUMNS, Columns, EventFile, Facts
-from adv2e.formats.writing import Request, Writer, to_json
+from adv2e.formats.writing import Pieces, Request, Writer, to_json
 from adv2e.light.pictures import eight_bit
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.frame import Pixels, Shot, Track, counted
@@ -427,7 +427,6 @@ class _Bag:
 
     Attributes
     ----------
-    is_ros1 : bool
     settings : str
         What this program wrote inside, if it did.
     events_count : int
@@ -569,12 +568,10 @@ class _BagWriter(Writer):
 
     _is_cdr = False
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        (path,) = temporary
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._request = request
         self._frames = stack.enter_context(closing(Backlog(path.parent)))
-        self._buffer = np.empty(_MESSAGE, EVENT_DTYPE)
-        self._held = 0  # events in it
+        self._pieces = Pieces(_MESSAGE, EVENT_DTYPE)
         try:
             import rosbags  # noqa: F401, PLC0415 - an optional package
         except ImportError:
@@ -604,12 +601,8 @@ class _BagWriter(Writer):
 
     def write_events(self, events: Events) -> None:
         """Append events."""
-        while events.size:
-            part, events = np.split(events, [_MESSAGE - self._held])
-            self._buffer[self._held : self._held + part.size] = part
-            self._held += part.size
-            if self._held == _MESSAGE:
-                self._write_held()
+        for piece in self._pieces.add(events):
+            self._write_piece(piece)
 
     def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
         """Append a frame."""
@@ -617,15 +610,14 @@ class _BagWriter(Writer):
 
     def finish(self) -> None:
         """Write the remaining events and frames, and close the bag."""
-        self._write_held()
+        self._write_piece(self._pieces.take())
         while len(self._frames):
             self._write_frame()
         bag, self._bag = self._bag, None
         bag.close()
 
-    def _write_held(self) -> None:
-        """Write the events held, and the frames among them."""
-        held = self._buffer[: self._held]
+    def _write_piece(self, held: Events) -> None:
+        """Write events, and the frames among them."""
         while held.size and len(self._frames):
             cut = int(np.searchsorted(held["t"] * 1000, self._frames.time(0)))
             if cut == held.size:
@@ -634,7 +626,6 @@ class _BagWriter(Writer):
             self._write_frame()
             held = held[cut:]
         self._write_events(held)
-        self._held = 0
 
     def _write_events(self, events: Events) -> None:
         if events.size:

@@ -311,7 +311,6 @@ def _stamp(path: Path, image: h5py.Dataset, name: str) -> NDArray[Any]:
 
 
 def _shape(path: Path, image: h5py.Dataset) -> tuple[int, ...]:
-    """Return the shape of an image; DataError if it is none."""
     shape = tuple(image.shape)
     if len(shape) not in (2, 3) or (len(shape) == 3 and shape[2] not in (1, 3)) or 0 in shape:
         raise DataError(f"{path}: {image.name[1:]} is no image, but of shape {shape}")

@@ -251,8 +251,7 @@ class NpzWriter(Writer):
     How many events there are stands before each column, so the columns wait on disk until then.
     """
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        (path,) = temporary
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._request = request
         self._archive = stack.enter_context(
             zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL)

@@ -152,7 +152,6 @@ class Intervals:
         return self._count - 2
 
     def _cut(self, frames: Iterator[Timed]) -> Iterator[_Instant]:
-        """Yield the instants of all intervals."""
         upsampler = self._upsampler
         if upsampler is None:
             count = self._L

@@ -112,7 +112,6 @@ def _log_light(a: NDArray[Any], b: NDArray[Any]) -> tuple[Image, Image]:
 
 
 def _flow(ga: Image, gb: Image) -> list[tuple[Image, Image]]:
-    """Return (u, v) from a to b and from b to a."""
     low = min(float(ga.min()), float(gb.min()))
     span = max(float(ga.max()), float(gb.max())) - low
     # a picture of hardly any contrast is not stretched: that would be flow of its noise

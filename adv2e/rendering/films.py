@@ -145,7 +145,6 @@ class VideoFile:
                 self._size = file.seek(0, 2)
 
     def close(self) -> None:
-        """Let go of the file, complete or not."""
         with suppress(Exception):  # what led here says more
             self._complete()
 
@@ -302,7 +301,6 @@ class Film:
         self._file.finish()
 
     def close(self) -> None:
-        """Let go of the file."""
         self._file.close()
 
 
@@ -335,7 +333,6 @@ class Sheet:
         self._cells = {n: cell for n, cell in self._cells.items() if self.wanted_from(n) == n}
 
     def finish(self) -> None:
-        """Choose the cells and write the picture."""
         cells = list(self._cells.values())
         shown = min(self._count, len(cells))
         places = [int((n + 0.5) * len(cells) / shown) for n in range(shown)]  # evenly spread

@@ -67,7 +67,6 @@ class Style:
 
     @property
     def background(self) -> Colour:
-        """The colour of a pixel without events."""
         paper = COLOURS["black" if self.name == "black" else "white"]
         return _grey_levels(0) if self.name == "grey" else paper
 

@@ -33,7 +33,6 @@ _LONG_AGO, _FAR_OFF = -(1 << 62), 1 << 62
 
 
 def caption(since_us: int, count: int) -> str:
-    """Return time and number of events."""
     return f"{since_us * 1e-6:.3f} s   {count:,} events"
 
 
@@ -144,7 +143,6 @@ class Timeline:
         return True
 
     def close(self) -> None:
-        """Let go of what waits on disk."""
         self._coming.close()
         self._frames.close()
 

@@ -101,7 +101,6 @@ def _unlike(curve: Curve) -> float:
 
 
 def _legend(wording: Wording, *, two: bool) -> Markup:
-    """Return the legend of all curves: lines and bands."""
     entries = [("measured", "measured"), ("before", "before: the declared model")]
     if two:
         entries.append(("after", "after: the model found"))
@@ -359,7 +358,6 @@ class Axis:
         return float(self.place(np.asarray(value, dtype=np.float64)))
 
     def ticks(self) -> list[tuple[float, str]]:
-        """Return places in the picture and labels."""
         if self.names:
             return [(self.at(value), name) for value, name in self.names]
         ticks = log_ticks(self.low, self.high) if self.log else linear_ticks(self.low, self.high)
@@ -409,12 +407,10 @@ def _log_axis(low: float, high: float, start: float, end: float, tight: bool) ->
 
 
 def wrapped(text: str, width: float) -> list[str]:
-    """Return `text` in lines of about `width`."""
     return textwrap.wrap(text, max(8, int(width / _CHARACTER))) or [""]
 
 
 def place_text(x: float, y: float, content: str, **attributes: object) -> Markup:
-    """Return `content` with its base line at (x, y)."""
     return tag("text", content, x=f"{x:.1f}", y=f"{y:.1f}", **attributes)
 
 

@@ -47,7 +47,6 @@ def _pictures(seen: Snapshot, names: Sequence[str]) -> Markup:
 
 
 def _totals(given: Sequence[Total], names: Sequence[str]) -> Markup:
-    """Return a table of totals over all events."""
     columns = [Column("all events"), *(Column(name, number=True) for name in names)]
     rows = []
     for one in given:

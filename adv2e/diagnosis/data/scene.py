@@ -40,8 +40,6 @@ class Scene:
         Thirds of what moves.
     speed_borders, brightness_borders : (2,)
         Between the thirds, [ln/s] and [DN].
-    split : Split
-    width, height : int
     leaps : Leaps, optional
         Of known light; None: what there is are frames.
     """
@@ -106,7 +104,6 @@ class Scene:
 
     @cached_property
     def seconds(self) -> NDArray[np.float64]:
-        """Length of each frame interval [s]."""
         return np.diff(self.times_us) * 1e-6
 
     @property

@@ -53,7 +53,6 @@ class Split:
         return len(self.label)
 
     def segment_of(self, t: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the segment of each of sorted times [us]."""
         inner = np.searchsorted(t, self.borders_us[1:-1])  # sorted: few searches, not many
         return np.repeat(np.arange(self.segments), np.diff(np.r_[0, inner, len(t)]))
 
@@ -66,7 +65,6 @@ class Split:
         return float(np.mean(self.label == part))
 
     def text(self) -> str:
-        """Return a sentence about the split, with the share of each part."""
         shares = ", ".join(f"{name} {self.share(k):.0%}" for k, name in enumerate(NAMES))
         return (
             f"the sensor was divided into tiles and the time into {self.segments} segments, shared"
@@ -89,7 +87,6 @@ class Stream:
         Row times columns plus column.
     on : (n,) int8
         1: ON, 0: OFF.
-    width, height : int
     """
 
     t: NDArray[np.int64]
@@ -115,7 +112,6 @@ class Stream:
         return len(self.t)
 
     def between(self, start_us: float, stop_us: float) -> Stream:
-        """Return the events of a span of time."""
         return self.chosen(slice(*np.searchsorted(self.t, [start_us, stop_us])))
 
     def chosen(self, which: Any) -> Stream:
@@ -131,7 +127,6 @@ class Stream:
 
     @cached_property
     def by_pixel(self) -> NDArray[np.int64]:
-        """Order by pixel, and by time in each."""
         # radix sort for 16-bit numbers
         small = self.width * self.height <= 1 << 16
         return np.argsort(self.pixel.astype(np.uint16) if small else self.pixel, kind="stable")

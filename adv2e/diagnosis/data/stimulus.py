@@ -78,7 +78,6 @@ class Stimulus:
 
     @cached_property
     def leaps(self) -> Leaps:
-        """Times at which the light of each pixel leaps [us]."""
         each = [_leaps_us(self.times_ns, one) for one in self.light.T]
         return Leaps(tuple(each), self.region.ravel())
 
@@ -193,7 +192,6 @@ class Seen(Sequence[NDArray[Any]]):
 
 
 def joined(before: Sequence[NDArray[Any]], after: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
-    """Return two sequences of frames, one after the other."""
     if isinstance(before, Seen) and isinstance(after, Seen):
         return Seen(np.concatenate([before.light, after.light]), after.region)
     return [*before, *after]

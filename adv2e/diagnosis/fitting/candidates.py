@@ -25,7 +25,6 @@ class FitParameter:
 
     Attributes
     ----------
-    key : str
     low, high : float
         Physical range.
     log : bool
@@ -53,7 +52,6 @@ class FitParameter:
     of_pixels: bool = False
 
     def scaled(self, value: float) -> float:
-        """Return `value` on the fitted scale."""
         return math.log(value) if self.log else value / self.scale
 
     def value_at(self, scaled: float) -> float:
@@ -68,7 +66,6 @@ class FitParameter:
         return value <= self.low + low or value >= self.high - high
 
     def set(self, values: dict[str, Any], value: float) -> None:
-        """Set the key in nested mappings."""
         held: Any = value
         if self.text:
             held = self.text.format(f"{value:.6g}")
@@ -93,8 +90,6 @@ class Candidate:
 
     Attributes
     ----------
-    name : str
-    parameters : tuple of FitParameter
     starts : tuple of tuple of float
         Values from which the fit may start.
     extra : tuple of (str, value)
@@ -169,7 +164,6 @@ class Candidate:
         return applied if self.pulse is None else self.pulse.placed(applied)
 
     def settings(self, point: Point) -> dict[str, Any]:
-        """Return the keys that this effect sets, and their values."""
         return dict(flat(self._set({}, point)))
 
     def settings_in(self, config: Config, point: Point) -> dict[str, Any]:

@@ -24,7 +24,6 @@ class Fitted:
 
     Attributes
     ----------
-    candidate : Candidate
     base : Config
         The model that the candidate is added to.
     point : (parameters,)
@@ -40,7 +39,6 @@ class Fitted:
         to be, until :meth:`Fitter.set_covariance` is called.
     reach : float
         Over which the next derivative is taken.
-    damping : float
     moved : float
         By the last step, at most, in deviations of the point.
     simulations : int
@@ -71,7 +69,6 @@ class Fitted:
         return self.at_point(self.point)
 
     def at_point(self, point: Array) -> Config:
-        """Return the model with the effect at another point."""
         return self.candidate.applied(self.base, point)
 
     @property
@@ -106,7 +103,6 @@ class Fitted:
 
     @property
     def at_border(self) -> bool:
-        """True if a fitted parameter is at the end of its physical range."""
         pairs = zip(self.candidate.parameters, self.point, strict=True)
         return any(one.at_border(at) for one, at in pairs)
 
@@ -156,7 +152,6 @@ class Axes:
         return cls(columns.T, deviation, np.clip(_REACH * deviation, *_REACHES))
 
     def along(self, move: Array) -> Array:
-        """Return the parts of a move along each direction."""
         return np.asarray(self.directions @ move)
 
 

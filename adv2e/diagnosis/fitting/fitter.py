@@ -91,7 +91,6 @@ class Fitter:
         ]
 
     def misfit(self, config: Config, seeds: Sequence[int]) -> float:
-        """Return the sum of squares of a model as it is."""
         return self._square(self.whites([config], seeds)[0])
 
     def _square(self, mean: Array) -> float:

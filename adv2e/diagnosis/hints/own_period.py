@@ -105,7 +105,6 @@ class OwnPeriod:
 
     @property
     def read_off(self) -> tuple[tuple[str, float], ...]:
-        """Standard deviations of the keys."""
         return (PERIOD, self.period_sd_us), (DELAY, self.begin_sd_us)
 
     def text(self) -> str:
@@ -213,7 +212,6 @@ def _likeliest(height: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def _highest(height: Array) -> list[int]:
-    """Return the bins of the highest bursts, of each the highest."""
     left, found = height.copy(), []
     for _ in range(_HIGHEST):
         top = int(np.argmax(left))

@@ -122,7 +122,6 @@ class Burst:
     ----------
     begins_us : float
         After the time of each frame, or whole intervals later or earlier.
-    lasts_us : float
     share : float
         Of the polarity's events that are in such bursts.
     """

@@ -181,7 +181,6 @@ def _band(rows: Sequence[Array]) -> Band:
 
 
 def _between_events() -> Iterator[_Axes]:
-    """Yield the times between events of a pixel, and of the whole sensor."""
     for kind, same in (("same", True), ("other", False)):
         title, label = f"a pixel, {kind} polarity", "the event before [ms]"
         yield _times(title, label, _GAPS_MS, _gaps(same))

@@ -167,7 +167,6 @@ class Conclusion:
 
 
 def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion:
-    """Look at the test data, and decide."""
     scene, simulator = prepared.scene, prepared.reference.sampler.simulator
     simulator.begin("judging on data not used so far")
 

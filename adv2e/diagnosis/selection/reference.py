@@ -51,7 +51,6 @@ class State:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the effects that were added."""
         return tuple(fit.candidate.name for fit in self.fits)
 
     @property
@@ -65,7 +64,6 @@ class State:
         return self.left <= FITTED
 
     def beyond(self, ground: State) -> tuple[Fitted, ...]:
-        """Return the effects that were added to those of another model."""
         return self.fits[len(ground.fits) :]
 
 
@@ -236,5 +234,4 @@ class Reference:
         return state.ensembles[view].misfit(self.observed[view])
 
     def likelihood(self, state: State, view: int = BOTH) -> float:
-        """Return the log likelihood of the recording under a model."""
         return state.ensembles[view].log_likelihood(self.observed[view])

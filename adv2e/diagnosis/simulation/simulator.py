@@ -78,7 +78,6 @@ class Simulator:
         return made
 
     def close(self) -> None:
-        """Drop what has not begun."""
         self._pool.shutdown(cancel_futures=True)
 
     def stream(self, config: Config, seed: int, *, rough: bool = False) -> Stream:
@@ -100,7 +99,6 @@ class Simulator:
         return Stream.of(events, evidence.width, evidence.height).between(first, last)
 
     def streams(self, config: Config, seeds: Iterable[int]) -> list[Stream]:
-        """Return the events of simulations of one model."""
         return self.map(lambda seed: self.stream(config, seed), seeds)
 
     def map(self, work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:

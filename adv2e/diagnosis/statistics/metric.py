@@ -93,7 +93,6 @@ def compressed(z: Array) -> Array:
 
 
 def expanded(compressed: Array | float) -> Array:
-    """Return deviations as they were before they were compressed."""
     return np.asarray(_KNEE * np.sinh(np.asarray(compressed) / _KNEE))
 
 
@@ -138,7 +137,6 @@ class Ensemble:
         return float(np.mean(white * white))
 
     def log_likelihood(self, values: Array) -> float:
-        """Return the log likelihood of measured statistics, but for a constant."""
         white = self.scale.whitening @ self.z(values)
         return float(-0.5 * white @ white - np.log(self.sd).sum())
 

@@ -102,7 +102,6 @@ class SummaryStatistics:
         return np.concatenate(columns, axis=1)
 
     def sample(self, streams: Iterable[Stream]) -> Array:
-        """Return the statistics of several streams, (streams, views, statistics)."""
         return np.array([self.measure(stream) for stream in streams])
 
 
@@ -134,7 +133,6 @@ class Sampler:
 
     @cached_property
     def rough(self) -> Sampler:
-        """The same with rougher simulations."""
         return Sampler(self.simulator, self.statistics, self._bias, is_rough=True)
 
     def _measured(self, simulator: Simulator, config: Config, seed: int) -> Array:

@@ -112,17 +112,14 @@ class Rates:
 
     @property
     def leak(self) -> Array:
-        """Leak events of the typical pixel."""
         return _typical(self.leak_of, self.weights)
 
     @property
     def on(self) -> Array:
-        """ON events of the typical pixel."""
         return _typical(self.leak_of + self.on_of, self.weights)
 
     @property
     def off(self) -> Array:
-        """OFF events of the typical pixel."""
         return _typical(self.off_of, self.weights)
 
     @property
@@ -138,7 +135,6 @@ class Rates:
         return mean
 
     def at(self, lights: NDArray[np.int64]) -> Rates:
-        """Return the rates at some of the lights, by their numbers."""
         parts = (self.leak_of[lights], self.on_of[lights], self.off_of[lights])
         return Rates(self.weights, *parts, self.hot_fraction, self.hot_hz)
 
@@ -387,7 +383,6 @@ def _cubic(place: Array, count: int) -> tuple[NDArray[np.int64], list[Array]]:
 
 
 def _laws(sources: NoisySources, light: Array, leak: Array) -> list[Law]:
-    """Return the law at each light, with its leak [Hz]."""
     corner = sources.dark_cutoff_hz + (sources.cutoff_hz - sources.dark_cutoff_hz) * light
     white = 2.0 * np.pi * max(sources.cutoff_hz, sources.dark_cutoff_hz)
     sampled_s = min(sources.noise_step / white, LONGEST_US * 1e-6)

@@ -128,7 +128,6 @@ class NoiseProblem(Problem):
             )
 
     def rates(self, values: Mapping[str, float], light: Array) -> Rates:
-        """Return the rates at `light`, in the table's unit."""
         pixel = self.declared.config.pixel
         noise, corner = pixel.photoreceptor_noise, pixel.low_pass
         sources = NoisySources(

@@ -119,10 +119,8 @@ class Problem(ABC):
         Rows that make one curve over the light, by its title.
     nuisances : Candidate
         Keys that are always fitted; in a name with a bracket, what is no key of the configuration.
-    candidates : list of Candidate
     neutral : mapping of str to float
         Keys that this model has at a value other than the default, where not written.
-    notes : list of str
     step : float
         By which logarithms of parameters are moved for a derivative.
     tolerance : float

@@ -66,7 +66,6 @@ class FittedSet:
 
     Attributes
     ----------
-    effects : tuple of Candidate
     joint : Candidate
         What was fitted: nuisances, then the effects.
     point : (parameters,)
@@ -90,7 +89,6 @@ class FittedSet:
 
     @property
     def settings(self) -> dict[str, float]:
-        """Fitted values by key, and those that go with them."""
         return self.joint.settings(self.point)
 
     @property
@@ -229,7 +227,6 @@ class Selector:
         return Draws(logs, ideal + moved @ slopes.T, (above + 1) / (len(drawn) + 1))
 
     def predicted(self, joint: Candidate, point: Array) -> Array:
-        """Return the logarithms that a model predicts, (rows,)."""
         return self.problem.predict(joint.settings(point))
 
     def _fit(

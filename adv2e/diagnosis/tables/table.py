@@ -62,8 +62,6 @@ class Table:
     ----------
     name : str
         The file, for messages.
-    columns : tuple of str
-    rows : tuple of tuples of str
     lines : tuple of int
         Line number of each row, from 1.
     decimal_comma : bool
@@ -332,7 +330,6 @@ def _latencies(table: Table, column: str, light: Array, unit: str) -> Latencies:
 
 
 def _standard_error_us(table: Table) -> Array:
-    """Return the standard error of each latency; NaN: not given."""
 
     def column_of(what: str) -> tuple[str, Array]:
         names = {f"latency_{what}_{unit}": factor for unit, factor in TIMES.items()}

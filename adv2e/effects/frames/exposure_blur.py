@@ -174,7 +174,6 @@ class ExposureBlurHooks(Hooks):
         return first
 
     def _block(self, held: list[tuple[int, NDArray[Any]]], begin: int, end: int) -> Frames:
-        """Yield the frames begin..end of those held, sharpened."""
         if begin == end:
             return
         origin = held[0][0]

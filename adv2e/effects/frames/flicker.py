@@ -75,7 +75,6 @@ class FlickerHooks(Hooks):
         self.step_us = 1e6 / (_STEPS_PER_PERIOD * parameters.frequency_hz)
 
     def gain(self, times_s: Times) -> NDArray[np.float64]:
-        """Return the factors on the light, (n,)."""
         p = self.parameters
         # whole turns taken off first: an epoch time would lose the phase in rounding
         turns = np.remainder(times_s * p.frequency_hz, 1.0)

@@ -49,7 +49,6 @@ class EventLossHooks(Hooks):
     Parameters = EventLoss
 
     def begin(self, view: View) -> None:
-        """Start the numbers of the events of each pixel at 0."""
         super().begin(view)
         self._numbers = np.zeros(view.rows * view.columns, np.int64)
 

@@ -132,7 +132,6 @@ class FrameCouplingHooks(Hooks):
         self.step_us = parameters.tau_us / _STEPS_PER_TAU
 
     def begin(self, view: View) -> None:
-        """Forget the frames of the recording before."""
         super().begin(view)
         # of each leap: its time, and the sum of what all up to it have left at that time
         self._leaps: list[float] = []

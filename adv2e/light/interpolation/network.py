@@ -131,7 +131,6 @@ def in_tiles(
 
 
 def _ramp(length: int) -> Image:
-    """Return shares that grow from near 0 to near 1."""
     return ((np.arange(length) + 0.5) / length).astype(np.float32)
 
 

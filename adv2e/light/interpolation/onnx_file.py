@@ -134,7 +134,6 @@ class Network:
 
     @property
     def text(self) -> str:
-        """Description of the network in a few words."""
         when = "at any time" if self.knows_time else "in the middle of two"
         colour = "colour" if self._images[0].channels > 1 else "grey"
         return f"{self.source['file']}: {colour}, {self.encoding}, {when}"
