@@ -74,7 +74,6 @@ class Proof:
 
     @classmethod
     def of(cls, manifest: Path) -> Proof:
-        """Return the check for a manifest as it is now."""
         text = manifest.read_bytes()
         return cls(__version__, str(manifest), len(text), hashlib.sha256(text).hexdigest())
 
@@ -286,7 +285,6 @@ class _Workers:
                 one.exception(timeout=_ANSWER_S)
 
     def lost(self) -> Adv2eError:
-        """Return the error to raise when the scheduler does not answer."""
         return Adv2eError(
             f"{self._scheduler}: the connection to the scheduler is lost: call again to go on"
         )
@@ -397,6 +395,5 @@ def _file(name: str, text: bytes, folder: str) -> str:
 
 
 def _sweep(folders: Iterable[str]) -> None:
-    """Remove what dead processes of this machine left in folders."""
     for folder in folders:
         remove_abandoned(Path(folder))

@@ -491,7 +491,6 @@ def _check_apart(wanted: Wanted, sequences: Sequence[Found]) -> None:
 
 
 def _shares(sequences: int, jobs: int | None, threads: int | None) -> tuple[int, int]:
-    """Return the number of simultaneous conversions, and of threads for each."""
     threads = threads or default_threads()
     count = max(1, min(jobs or threads, sequences))
     return count, max(1, threads // count)

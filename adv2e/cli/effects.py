@@ -68,7 +68,6 @@ def _list() -> str:
 
 
 def _wrapped(begin: str, text: str) -> str:
-    """Return `text` behind `begin`, both indented, in lines that fit a terminal."""
     indent = " " * (2 + len(begin))
     return fill(f"  {begin}{text}", _WIDTH, subsequent_indent=indent, break_on_hyphens=False)
 

@@ -128,7 +128,6 @@ def _tuple(key: Key, value: Value) -> tuple[Any, ...]:
 
 
 def parts_of(key: Key) -> tuple[Key, ...]:
-    """Return the parts of a key that holds a list, each as a key of its own."""
     return tuple(
         dataclasses.replace(key, path=f"{key.path}[{n}]", kind=kind, parts=())
         for n, kind in enumerate(key.parts)

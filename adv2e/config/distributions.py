@@ -206,7 +206,6 @@ class Distributions:
 
 
 def _share(seed: int, path: str, attempt: int) -> float:
-    """Return a number between 0 and 1, neither of which it is."""
     digest = hashlib.sha256(f"{seed}\n{path}\n{attempt}".encode()).digest()
     return float(((int.from_bytes(digest[:8], "big") >> 12) + 0.5) / (1 << 52))
 
@@ -216,7 +215,6 @@ def _value(number: _Law | Number, seed: int, path: str, attempt: int) -> Number:
 
 
 def _numbers(section: type[Section], tree: Value, path: str = "") -> Iterator[tuple[Key, Value]]:
-    """Yield the keys of numbers that `tree` writes, and what it writes there."""
     if not isinstance(tree.content, dict):
         return
     for key in keys_of(section, path):

@@ -171,7 +171,6 @@ _KINDS = (float, int, bool, str)
 
 
 def _key_complaint(key: Key) -> str | None:
-    """Return the error in the declaration of a parameter or of its fit, or None."""
     kinds = key.parts or (key.kind,)
     if not set(kinds) <= set(_KINDS):
         wanted = ", ".join(kind.__name__ for kind in _KINDS)

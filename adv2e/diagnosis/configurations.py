@@ -18,7 +18,6 @@ from adv2e.reports.markup import Own, known_keys
 
 
 def with_keys(config: Config, keys: Mapping[str, Any]) -> Config:
-    """Return `config` with other values of some keys, given by their paths."""
     values = to_dict(config)
     for key, value in keys.items():
         set_key(values, key, value)

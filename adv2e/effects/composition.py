@@ -78,7 +78,6 @@ def _is_timed(hook: Hooks) -> bool:
 
 
 def cause_of_signal(hooks: Sequence[Hooks]) -> int:
-    """Return the cause of events by what effects add to the signal."""
     return OWN_EFFECT if any(map(_is_own, _adding(hooks))) else FRAME_COUPLING
 
 
@@ -145,7 +144,6 @@ def _values(hook: Hooks, method: str, part: int | None, combine: np.ufunc, times
 
 
 def injected(hooks: Sequence[Hooks], start_s: float, stop_s: float) -> Array:
-    """Return the events that `hooks` inject, as INJECTED_DTYPE, sorted by time."""
     parts = [np.empty(0, INJECTED_DTYPE)]
     for hook in (hook for hook in hooks if overrides(hook, "inject")):
         with blamed(hook):

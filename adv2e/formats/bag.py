@@ -415,7 +415,6 @@ class _Topic:
 
 
 def _topics(connections: list[Any]) -> list[_Topic]:
-    """Return the topics of the connections that the package found."""
     found: dict[tuple[str, str], list[Any]] = {}
     for connection in connections:
         found.setdefault((connection.topic, connection.msgtype), []).append(connection)

@@ -249,7 +249,6 @@ class ZipWriter(_Davis240cWriter):
         self._add(DESCRIPTION, to_json(self._description).encode())
 
     def _add(self, name: str, data: bytes, method: int = zipfile.ZIP_DEFLATED) -> None:
-        """Add a member with the time that zip counts from."""
         info = zipfile.ZipInfo(name)
         info.compress_type = method
         info.external_attr = 0o644 << 16

@@ -300,7 +300,6 @@ class _Images:
 
 
 def _stamp(path: Path, image: h5py.Dataset, name: str) -> NDArray[Any]:
-    """Return an array of the one number in an attribute."""
     if name in image.attrs:
         stamp = np.asarray(image.attrs[name])
         if stamp.size == 1 and stamp.dtype.kind in "iuf":

@@ -220,7 +220,6 @@ def _take(file: IO[bytes], dtype: np.dtype[Any], count: int, label: str) -> NDAr
 
 
 def _whole(label: str, name: str, column: NDArray[Any]) -> NDArray[np.int64]:
-    """Return a column of whole numbers, whatever their type."""
     if column.dtype.kind not in "biuf":
         raise DataError(f"{label}: {name} must hold numbers, not {column.dtype}")
     if column.dtype.kind == "f" and not np.array_equal(np.floor(column), column):
@@ -286,7 +285,6 @@ class NpzWriter(Writer):
     def _add(
         self, name: str, dtype: np.dtype[Any], shape: tuple[int, ...], data: IO[bytes]
     ) -> None:
-        """Add an array with the time that zip counts from."""
         info = zipfile.ZipInfo(f"{name}.npy")
         info.compress_type = zipfile.ZIP_DEFLATED
         info.external_attr = 0o644 << 16

@@ -53,7 +53,6 @@ class _File(io.FileIO):
     error: OSError | None = None
 
     def write(self, data: Any) -> int:
-        """Write all of the bytes, or nothing more after an error."""
         left = memoryview(data).cast("B")
         try:
             while self.error is None and left.nbytes:
@@ -96,7 +95,8 @@ class VideoFile:
             if self._container is None:
                 self._open(frame.width, frame.height)
             self._container.mux(self._stream.encode(frame))
-            self._check()
+            if self._file.error is not None:
+                raise self._file.error
         self._count += 1
 
     def _frame(self, picture: Picture) -> av.VideoFrame:
@@ -107,7 +107,6 @@ class VideoFile:
         return av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
 
     def _open(self, width: int, height: int, **more: str) -> None:
-        """Open the file for pictures of a size, with `more` options of the container."""
         kind, coder, pixels, options = CODERS[self._path.suffix.lower()]
         # FFmpeg takes parts of names for addresses and patterns
         self._file = _File(self._path, "wb")
@@ -117,10 +116,6 @@ class VideoFile:
         self._stream.pix_fmt = pixels
         if coder == "libvpx":
             self._stream.bit_rate = _VP8_BITS
-
-    def _check(self) -> None:
-        if self._file.error is not None:
-            raise self._file.error
 
     def finish(self) -> None:
         """Complete the file and check that it holds all pictures."""

@@ -246,7 +246,6 @@ def _scaled(picture: Picture, scale: float) -> Picture:
 
 
 def _paper(style: Style) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
-    """Return the colours of paper and ink around the panels."""
     if style.name == "black":
         return (28, 28, 28), (225, 225, 225)
     return (240, 240, 240), (20, 20, 20)

@@ -209,7 +209,6 @@ class Timeline:
             self._frames.drop()
 
     def _frame_at(self, t_us: int) -> Picture:
-        """Return the last frame at or before `t_us`, or a grey panel."""
         self._drop_frames(t_us)
         if self._frames and self._frames.time(0) <= t_us:
             image = self._frames.take()

@@ -304,7 +304,6 @@ def log_ticks(low: float, high: float, most: int = 7) -> list[float]:
 
 
 def tick_labels(ticks: Sequence[float]) -> list[str]:
-    """Return the labels of `ticks`, each right to a part in a million of their distance."""
     gap = min((b - a for a, b in itertools.pairwise(ticks)), default=0.0)
     labels: list[str] = []
     for digits in range(6, 18):

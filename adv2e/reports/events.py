@@ -22,7 +22,6 @@ def events(diagnosis: Diagnosis) -> Markup:
 
 
 def _pictures(seen: Snapshot, names: Sequence[str]) -> Markup:
-    """Return the events of a short time side by side, in the same colours."""
     top, figures = top_of(seen), []
     for name, number in zip(names, (seen.measured, seen.before, seen.after), strict=False):
         off, on = (int(one.sum()) for one in number)

@@ -155,7 +155,6 @@ class Evidence:
         return replace(part, stimulus=seen, frames=of_part(self.frames), run_in=before)
 
     def with_frames(self, changed: Callable[[NDArray[Any]], NDArray[Any]]) -> Evidence:
-        """Return the recording with all frames changed, those of the run-in as well."""
         before = replace(self.run_in, frames=[changed(one) for one in self.run_in.frames])
         return replace(self, frames=[changed(one) for one in self.frames], run_in=before)
 

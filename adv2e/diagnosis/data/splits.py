@@ -119,7 +119,6 @@ class Stream:
         return Stream(self.t[which], self.pixel[which], self.on[which], self.width, self.height)
 
     def events(self) -> Events:
-        """Return the events in the package's own form."""
         events = np.empty(len(self), EVENT_DTYPE)
         events["t"], events["p"] = self.t, self.on
         events["y"], events["x"] = np.divmod(self.pixel, self.width)

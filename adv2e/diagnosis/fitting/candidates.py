@@ -60,7 +60,6 @@ class FitParameter:
         return float(min(max(value, self.low), self.high))
 
     def at_border(self, scaled: float) -> bool:
-        """Tell whether the fit has run to the end of the physical range."""
         value = self.value_at(scaled)
         low, high = 1e-9 * abs(self.low), 1e-9 * abs(self.high)
         return value <= self.low + low or value >= self.high - high

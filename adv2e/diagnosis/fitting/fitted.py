@@ -77,7 +77,6 @@ class Fitted:
         return self.candidate.settings_in(self.config, self.point)
 
     def inside(self, point: Array) -> Array:
-        """Return `point` within the physical ranges."""
         parameters = self.candidate.parameters
         return np.array(
             [one.scaled(one.value_at(at)) for one, at in zip(parameters, point, strict=True)]

@@ -81,7 +81,6 @@ class Readouts:
 
     @property
     def exposure_sd_us(self) -> float:
-        """Standard deviation of the exposures that end there."""
         return _SD_BINS * self.interval_us / _BINS
 
     def exposed(self, config: Config) -> Config:

@@ -77,7 +77,6 @@ class Outcome:
 
     @property
     def alternatives(self) -> list[str]:
-        """Effects that cannot be told from one of those that were added."""
         alike = frozenset().union(*self.state.alternatives.values())
         return sorted(alike - set(self.state.names))
 
@@ -380,7 +379,6 @@ class Search:
         return most or self._is_something_left(state)
 
     def _without(self, state: State, fit: Fitted) -> State:
-        """Return the model without one of its effects, the others fitted again."""
         self.reference.begin(f"searching: is {fit.candidate.name} needed")
         rest = tuple(other for other in state.fits if other is not fit)
         without = self.reference.settled(rest, state.ensembles[BOTH].sd)

@@ -233,14 +233,12 @@ class Ensemble:
 
 
 def _value(sample: Array, share: float, beyond: Callable[[Array, float], float]) -> float:
-    """Return the value that `share` or less of the distribution of `sample` exceeds."""
     rank = np.sort(sample)[::-1]
     within = int(share * (len(sample) + 1.0))
     return float(rank[within - 1] if within else max(rank[0], beyond(sample, share)))
 
 
 def _tail(sample: Array, value: float, beyond: Callable[[Array, float], float]) -> float:
-    """Return the probability of `value` or more under the distribution of `sample`."""
     rank = (1.0 + np.count_nonzero(sample >= value)) / (len(sample) + 1.0)
     return float(rank if value <= sample.max() else min(rank, beyond(sample, value)))
 

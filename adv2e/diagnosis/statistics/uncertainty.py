@@ -194,7 +194,6 @@ class Pilot:
 
     @cached_property
     def sample(self) -> Array:
-        """Their statistics, (seeds, views, statistics)."""
         return self.statistics.sample(self.streams.values())
 
     @cached_property

@@ -130,7 +130,6 @@ class Rates:
 
     @property
     def off_mean(self) -> Array:
-        """OFF events, mean over all pixels."""
         mean: Array = self.off_of @ self.weights
         return mean
 

@@ -252,7 +252,6 @@ def _drawn_share(share: Array | float, pixels: Array | float) -> tuple[Array, Ar
 
 
 def _share_error(data: Noise, kind: str, row: int) -> float:
-    """Return the relative error of the rate that a share counts as."""
     share, error = _drawn_share(float(data.rates[kind][row]), float(data.pixels[row]))
     ends = np.clip([share - 0.5 * error, share + 0.5 * error], 1e-9, 1.0 - 1e-9)
     return float(np.diff(np.log(_as_poisson(_number_of(kind), ends)))[0])

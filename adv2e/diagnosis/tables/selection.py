@@ -128,7 +128,6 @@ class Selector:
         return np.array([self._mean_square(self.problem.error, unit) for unit in self._units])
 
     def select(self) -> Choice:
-        """Return the verdict, with all sets tried."""
         candidates, log = self.problem.candidates, self._settings.log
         before = self.fitted(())
         p = self.drawn(before).p

@@ -119,6 +119,5 @@ class MisregistrationHooks(Hooks):
         self._shift_px = shift_px
 
     def light(self, frames: Frames) -> Frames:
-        """Yield the frames where the event pixels see them."""
         for t_ns, light in frames:
             yield t_ns, shifted(light, self._shift_px)

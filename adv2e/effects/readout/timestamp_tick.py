@@ -30,7 +30,6 @@ SEPARATED_BY = {"timestamp_tick": "none needed: all times are multiples of the t
 
 
 def ticked(times_us: NDArray[np.int64], tick_us: float) -> NDArray[np.int64]:
-    """Return the tick at or after each time [us]."""
     if float(tick_us).is_integer():
         tick = int(tick_us)
         return -(-times_us // tick) * tick

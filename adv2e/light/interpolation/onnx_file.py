@@ -139,7 +139,6 @@ class Network:
         return f"{self.source['file']}: {colour}, {self.encoding}, {when}"
 
     def value(self, light: NDArray[Any]) -> NDArray[np.float32]:
-        """Return light [DN] as values that it was trained on."""
         return encode_light(light.astype(np.float32, copy=False), self.encoding)
 
     def ask(
