@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 
@@ -60,6 +61,20 @@ class UsageError(Adv2eError):
     """The command line alone is wrong."""
 
     exit_status = 2
+
+
+def one_line(error: BaseException) -> str:
+    """Return the message of an exception in one line."""
+    return " ".join(str(error).split())
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return ``did you mean 'x'?``, or ""; x: the nearest name, or what a mapping has for it."""
+    import difflib  # noqa: PLC0415 - where a name is wrong
+
+    for near in difflib.get_close_matches(name, list(known), n=1):
+        return f"did you mean '{known[near] if isinstance(known, Mapping) else near}'?"
+    return ""
 
 
 def warn(text: str) -> None:

@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING, Any
 from adv2e import __version__
 from adv2e.batches.processes import EndedError, Workers
 from adv2e.batches.work import Job
-from adv2e.errors import Adv2eError, DataError, MissingExtraError, UsageError
+from adv2e.errors import Adv2eError, DataError, MissingExtraError, UsageError, one_line
 from adv2e.files.regular import read_text_bytes
 from adv2e.files.states import state_of
 from adv2e.files.workspace import remove_abandoned
@@ -63,7 +63,6 @@ class Proof:
         Of adv2e.
     manifest : str
         The file in DEST.
-    bytes : int
     sha256 : str
         Of that many bytes at its start, among which are lines of this run.
     """
@@ -75,7 +74,6 @@ class Proof:
 
     @classmethod
     def of(cls, manifest: Path) -> Proof:
-        """Return the check for a manifest as it is now."""
         text = manifest.read_bytes()
         return cls(__version__, str(manifest), len(text), hashlib.sha256(text).hexdigest())
 
@@ -159,7 +157,7 @@ class Cluster:
             except Exception as error:  # many kinds, where versions of Dask differ
                 raise Adv2eError(
                     f"{self._scheduler}: no scheduler of this Dask answers there:"
-                    f" {type(error).__name__}: {_one_line(error)}"
+                    f" {type(error).__name__}: {one_line(error)}"
                 ) from error
 
     def _run(
@@ -287,7 +285,6 @@ class _Workers:
                 one.exception(timeout=_ANSWER_S)
 
     def lost(self) -> Adv2eError:
-        """Return the error to raise when the scheduler does not answer."""
         return Adv2eError(
             f"{self._scheduler}: the connection to the scheduler is lost: call again to go on"
         )
@@ -322,12 +319,8 @@ def _found(future: Future, job: Job) -> dict[str, Any] | None:
         return {"error": f"{job.source}: {count} workers ended while they had it"}
     return {  # it could not even begin
         "unfit": f"or the scheduler has no adv2e {__version__}, or another Python or Dask than"
-        f" here: {type(error).__name__}: {_one_line(error)}"
+        f" here: {type(error).__name__}: {one_line(error)}"
     }
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())
 
 
 # ---- what workers run
@@ -377,7 +370,6 @@ _complaint = lru_cache(maxsize=1)(Proof.complaint)
 
 
 def _workers(count: int) -> Workers:
-    """Return the processes of this worker."""
     with _lock:
         if not _processes:
             workers = Workers(count)
@@ -403,6 +395,5 @@ def _file(name: str, text: bytes, folder: str) -> str:
 
 
 def _sweep(folders: Iterable[str]) -> None:
-    """Remove what dead processes of this machine left in folders."""
     for folder in folders:
         remove_abandoned(Path(folder))

@@ -20,7 +20,6 @@ import re
 from collections.abc import Iterator, Mapping
 from datetime import datetime, timezone
 from pathlib import Path, PurePath, PurePosixPath
-from types import TracebackType
 from typing import Any, BinaryIO
 
 from adv2e.errors import DataError, OutputError
@@ -122,12 +121,7 @@ class Manifest:
     def __enter__(self) -> Manifest:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         unlock_file(self._file)
         self._file.close()
 
@@ -152,7 +146,6 @@ class Manifest:
             raise
 
     def _cut(self) -> None:
-        """Cut off a last line that is torn."""
         self._file.seek(0)
         for _ in _lines(self.path, self._file):
             pass
@@ -162,7 +155,6 @@ class Manifest:
 
 
 def _lines(path: Path, file: BinaryIO) -> Iterator[dict[str, Any]]:
-    """Yield the record of each whole line."""
     for number, line in enumerate(file, start=1):
         record = _record(line)
         if record is not None:

@@ -21,11 +21,8 @@ class Task:
 
     Attributes
     ----------
-    sequence : Sequence
     state : State
         Of its source.
-    output : Path
-    seed : int
     why : str
         Why something is made; empty: all is kept.
     record : mapping, optional
@@ -51,7 +48,6 @@ class Wanted:
 
     Attributes
     ----------
-    dest : Path
     suffix : str
         Of the files; empty: folders.
     seed : int
@@ -129,11 +125,7 @@ def plan(
 
 
 def _why(
-    record: Mapping[str, Any] | None,
-    state: State,
-    sequence: Found,
-    output: Path,
-    wanted: Wanted,
+    record: Mapping[str, Any] | None, state: State, sequence: Found, output: Path, wanted: Wanted
 ) -> str:
     if record is None:
         return "new"

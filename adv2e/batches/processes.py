@@ -123,12 +123,7 @@ def run(jobs: Iterable[Job], count: int) -> Iterator[tuple[Job, dict[str, Any]]]
 
 
 class Workers(signals.Unfinished):
-    """Processes, each of which does one job after the other.
-
-    Parameters
-    ----------
-    count : int
-    """
+    """Processes, each of which does one job after the other."""
 
     def __init__(self, count: int) -> None:
         self._free: queue.SimpleQueue[_Worker] = queue.SimpleQueue()
@@ -166,7 +161,6 @@ class Workers(signals.Unfinished):
         return True
 
     def close(self) -> None:
-        """Let go of the processes."""
         for worker in self._all:
             worker.close()
 
@@ -210,7 +204,6 @@ class _Worker:
 
 
 def _asked(process: subprocess.Popen[bytes], job: Job) -> dict[str, Any]:
-    """Send a job to a worker process; return its result."""
     assert process.stdin is not None and process.stdout is not None
     pickle.dump(job, process.stdin)
     process.stdin.flush()

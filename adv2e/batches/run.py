@@ -119,12 +119,10 @@ class Outcome:
 
     @property
     def made(self) -> int:
-        """Sequences that were converted now."""
         return sum(bool(task.why) for task in self.tasks) - len(self.failed)
 
     @property
     def kept(self) -> int:
-        """Sequences whose files were kept."""
         return sum(not task.why for task in self.tasks)
 
 
@@ -135,7 +133,6 @@ class Batch:
     ----------
     source, dest : Path
         Where sequences are, and where the same tree of events is made.
-    settings : Settings
     layout : str
         Which sequences count; see :mod:`adv2e.batches.sequences`.
     shard : (int, int), optional
@@ -199,11 +196,7 @@ class Batch:
         """
         records = read_records(self.dest)
         tasks = plan(
-            self._sequences,
-            self._states,
-            records,
-            self._wanted,
-            overwrite=self._overwrite,
+            self._sequences, self._states, records, self._wanted, overwrite=self._overwrite
         )
         for path in outputs_outside(tasks, self._wanted):
             raise OutputError(f"{shown(path)}: a link leads out of {shown(self.dest)}: remove it")
@@ -218,7 +211,6 @@ class Batch:
     def forecast(
         self, tasks: Sequence[Task], jobs: int | None, threads: int | None
     ) -> Estimate | None:
-        """Return an estimate of the conversion; `jobs` and `threads` as for :meth:`run`."""
         waiting = [task for task in tasks if task.why and not task.only_export]
         count, each = _shares(len(waiting), jobs, threads)
 
@@ -452,11 +444,7 @@ class _Told:
     """The bar over all sequences, and a line for each failure."""
 
     def __init__(
-        self,
-        work: Batch,
-        options: BatchOptions,
-        log: Callable[[str, int], None],
-        stack: ExitStack,
+        self, work: Batch, options: BatchOptions, log: Callable[[str, int], None], stack: ExitStack
     ) -> None:
         self._work, self._options, self._log, self._stack = work, options, log, stack
         self._bar: Any = None
@@ -503,7 +491,6 @@ def _check_apart(wanted: Wanted, sequences: Sequence[Found]) -> None:
 
 
 def _shares(sequences: int, jobs: int | None, threads: int | None) -> tuple[int, int]:
-    """Return the number of simultaneous conversions, and of threads for each."""
     threads = threads or default_threads()
     count = max(1, min(jobs or threads, sequences))
     return count, max(1, threads // count)
@@ -527,12 +514,7 @@ def _job(task: Task, settings: Settings, wanted: Wanted, threads: int) -> Job:
     )
 
 
-def _record(
-    task: Task,
-    wanted: Wanted,
-    job: Job,
-    found: Mapping[str, Any],
-) -> dict[str, Any]:
+def _record(task: Task, wanted: Wanted, job: Job, found: Mapping[str, Any]) -> dict[str, Any]:
     kept = task.record or {}
     return {
         **{key: value for key, value in kept.items() if not key.startswith("export")},
@@ -550,7 +532,6 @@ def _record(
 
 
 def error_of(record: Mapping[str, Any]) -> str:
-    """Return the error of a sequence, "" without."""
     wrong: str = record.get("error") or record.get("export_error") or ""
     return wrong
 
@@ -600,7 +581,6 @@ def forecast(tasks: Sequence[Task], job_of: Callable[[Task], Job], jobs: int) ->
 
     Parameters
     ----------
-    tasks : sequence of Task
     job_of : callable
         Returns the conversion of a task.
     jobs : int

@@ -81,11 +81,7 @@ class Found:
 
 
 def find_sequences(
-    root: Path,
-    layout: str = "auto",
-    *,
-    leave_out: Path | None = None,
-    fps: Rate | None = None,
+    root: Path, layout: str = "auto", *, leave_out: Path | None = None, fps: Rate | None = None
 ) -> Found:
     """Return the sequences below a folder; or that of a file.
 
@@ -124,14 +120,11 @@ def find_sequences(
     ]
     result = Found(sorted(sequences, key=lambda one: natural_key(one.name)), passed)
     if not sequences:
-        raise DataError("; ".join([f"{root}: {_nothing(layout)}", *result.told()]))
+        nothing = f"holds no sequence of the layout {layout}"
+        if layout == "auto":
+            nothing = "holds no video, and no recording or folder with frames and their times"
+        raise DataError("; ".join([f"{root}: {nothing}", *result.told()]))
     return result
-
-
-def _nothing(layout: str) -> str:
-    if layout == "auto":
-        return "holds no video, and no recording or folder with frames and their times"
-    return f"holds no sequence of the layout {layout}"
 
 
 class _Walk:
@@ -180,7 +173,6 @@ class _Walk:
                 yield here, "images"
 
     def _against(self, folder: Path, images: int, *, is_beside: bool) -> str:
-        """Return the reason why a folder of images is no sequence; "" if it is, or has none."""
         if images == 0:
             return ""
         if is_beside:
@@ -228,7 +220,6 @@ class _Walk:
 
 
 def _is_stack(path: Path) -> bool:
-    """Tell whether a TIFF has several pages."""
     try:
         return len(Pages(path)) > 1
     except DataError:

@@ -36,7 +36,6 @@ class Job:
         Effects of the user's own.
     options : dict
         Further arguments of :func:`adv2e.convert`.
-    threads : int
     export : Export, optional
         What is made of the events, in `export_folder`.
     only_export : bool
@@ -72,7 +71,7 @@ def config_of(job: Job) -> Config:
 
 
 def do(job: Job) -> dict[str, Any]:
-    """Do what a job says, and return what the manifest says of it.
+    """Convert and export as a job says; return the record for the manifest.
 
     That holds ``error`` where nothing was made, and ``export_error`` where only events were.
     """
@@ -83,7 +82,6 @@ def do(job: Job) -> dict[str, Any]:
 
 
 def _reported(job: Job, error_key: str, work: Callable[[Job], dict[str, Any]]) -> dict[str, Any]:
-    """Return the result of `work`, or its error message under `error_key`."""
     try:
         return work(job)
     except Adv2eError as error:
@@ -180,11 +178,9 @@ class Export:
 
     @property
     def needs_frames(self) -> bool:
-        """True if files of events must hold the frames."""
         return self.kind != "voxel" or self.window_us is None
 
     def described(self) -> dict[str, Any]:
-        """Return the settings as the manifest records them."""
         return asdict(self)
 
     def make(

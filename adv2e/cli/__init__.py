@@ -16,12 +16,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from adv2e import __version__
-from adv2e.cli.exit_status import (
-    flush_stdout,
-    print_any_character,
-    reporting,
-    warnings_for_people,
-)
+from adv2e.cli.exit_status import flush_stdout, print_any_character, reporting, warnings_for_people
 from adv2e.process.machine import collect_seldom, return_large_blocks
 from adv2e.process.signals import stopping_on_signals
 
@@ -137,8 +132,7 @@ def _memory_of_a_command() -> Iterator[None]:
 
 
 @click.group(
-    cls=Program,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    cls=Program, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
 )
 @click.version_option(__version__, "-V", "--version", message="%(prog)s %(version)s")
 def main() -> None:

@@ -88,7 +88,6 @@ def command(
 
 
 def _tell_of(work: Batch, given: BatchOptions, log: Log) -> None:
-    """Print what a batch would do."""
     from adv2e.batches.run import reasons
 
     tasks = work.plan()

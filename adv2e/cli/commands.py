@@ -110,7 +110,6 @@ def _pattern(paths: Sequence[str]) -> str:
 
 
 def _without(given: Sequence[str], left_out: Sequence[str]) -> list[str]:
-    """Return the options among the arguments, quoted."""
     rest = list(given)
     for text in left_out:
         del rest[_last(rest, text)]
@@ -118,5 +117,4 @@ def _without(given: Sequence[str], left_out: Sequence[str]) -> list[str]:
 
 
 def _last(given: Sequence[str], text: str) -> int:
-    """Return the last index of `text`: earlier ones may be the value of an option."""
     return len(given) - 1 - given[::-1].index(text)

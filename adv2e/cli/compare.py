@@ -8,8 +8,8 @@ import click
 
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
-from adv2e.cli.progress import reading_told
 from adv2e.options import CompareOptions
+from adv2e.process.bars import reading_bar
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -67,7 +67,7 @@ def command(
         measured,
         simulated,
         declared if _configured() else None,
-        reading=lambda path: reading_told(path, progress),
+        reading=lambda path: reading_bar(path, progress),
         doubt=log,
         **given,
     )
@@ -82,7 +82,6 @@ def command(
 
 
 def _configured() -> bool:
-    """Tell whether a configuration was asked for on the command line."""
     given = click.get_current_context().params
     layers = (given["config_files"], given["sets"], given["effect_files"])
     return any(layers) or given["seed"] is not None

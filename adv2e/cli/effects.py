@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import MISSING
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -11,13 +10,13 @@ import click
 
 from adv2e.cli import completion
 from adv2e.cli.commands import Command
+from adv2e.errors import did_you_mean
 
 if TYPE_CHECKING:
     from adv2e.config import Key
     from adv2e.effects import Effect
 
 _WIDTH = 100
-_HOOKS = ("light", "gain", "drive", "signal", "thresholds", "inject", "events")
 
 
 @click.command("effects", cls=Command)
@@ -50,8 +49,7 @@ def command(name: str | None, every: bool) -> None:
     elif name in known:
         click.echo(_page(known[name]))
     else:
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"did you mean '{near[0]}'?" if near else f"there are {', '.join(known)}"
+        hint = did_you_mean(name, [*known]) or f"there are {', '.join(known)}"
         raise click.UsageError(f"no effect '{name}', {hint}")
 
 
@@ -70,13 +68,11 @@ def _list() -> str:
 
 
 def _wrapped(begin: str, text: str) -> str:
-    """Return `text` behind `begin`, both indented, in lines that fit a terminal."""
     indent = " " * (2 + len(begin))
     return fill(f"  {begin}{text}", _WIDTH, subsequent_indent=indent, break_on_hyphens=False)
 
 
 def _keys(effect: Effect) -> list[Key]:
-    """Return the keys of `effect` and its sections."""
     from adv2e.config import all_keys
 
     below = tuple(f"{path}." for path in effect.paths)
@@ -84,6 +80,7 @@ def _keys(effect: Effect) -> list[Key]:
 
 
 def _page(effect: Effect) -> str:
+    from adv2e.config.user_effects import METHODS
     from adv2e.effects import label_of, separated_by
     from adv2e.effects.hooks import Hooks
 
@@ -100,7 +97,7 @@ def _page(effect: Effect) -> str:
     path = effect.module.__name__.replace(".", "/")
     own = [c for c in vars(effect.module).values() if isinstance(c, type) and c is not Hooks]
     acting = {name for c in own if issubclass(c, Hooks) for name in vars(c)}
-    hooks = ", ".join(name for name in _HOOKS if name in acting)
+    hooks = ", ".join(name for name in METHODS if name in acting)
     lines.append(f"\nCode\n----\n{path}.py" + f" (hooks: {hooks})" * bool(hooks))
     test = f"tests/effects/test_{path.split('/')[-1]}.py\n"
     return "\n".join([*lines, test, "".join(references)])

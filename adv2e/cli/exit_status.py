@@ -29,7 +29,7 @@ from typing import TextIO
 
 import click
 
-from adv2e.errors import Adv2eError, Adv2eWarning, is_for_users
+from adv2e.errors import Adv2eError, Adv2eWarning, is_for_users, one_line
 from adv2e.files.regular import shown
 from adv2e.process.machine import machine_complaint
 from adv2e.process.signals import Terminated, last_words
@@ -74,11 +74,6 @@ def warnings_for_people() -> Iterator[None]:
         warnings.showwarning = usual
 
 
-def _joined(error: BaseException) -> str:
-    """Return the message of an exception in one line."""
-    return " ".join(str(error).split())
-
-
 @contextmanager
 def reporting(context: click.Context | None = None) -> Iterator[None]:
     """Turn what the body raises into a line on stderr and SystemExit.
@@ -97,7 +92,7 @@ def reporting(context: click.Context | None = None) -> Iterator[None]:
         complain(f"error: {error}")
         raise SystemExit(error.exit_status) from None
     except BrokenPipeError:
-        silence_stdout()
+        _silence(sys.stdout)
         raise SystemExit(_CLOSED_OUTPUT) from None
     except (KeyboardInterrupt, click.Abort) as error:
         complain(last_words(error))
@@ -111,7 +106,9 @@ def reporting(context: click.Context | None = None) -> Iterator[None]:
 
 def _explained(error: Exception, context: click.Context | None) -> int:
     """Print an exception that is not one of adv2e as an error message; return the exit status."""
-    traced = _trace(context)
+    traced = context is not None and context.meta.get(VERBOSITY, 0) >= 2
+    if traced:
+        traceback.print_exc()
     if told := machine_complaint(error):
         complain(f"error: {told}")
     elif isinstance(error, OSError):
@@ -119,7 +116,7 @@ def _explained(error: Exception, context: click.Context | None) -> int:
         complain(f"error: {place}{error.strerror or error}")
     else:
         hint = "" if traced else "; run with -vv for the traceback"
-        complain(f"error: internal error: {type(error).__name__}: {_joined(error)}{hint}")
+        complain(f"error: internal error: {type(error).__name__}: {one_line(error)}{hint}")
     return 1
 
 
@@ -150,14 +147,6 @@ def _click_text(error: click.ClickException) -> str:
     return text
 
 
-def _trace(context: click.Context | None) -> bool:
-    """Print the traceback of the exception at hand if -vv was given."""
-    if context is None or context.meta.get(VERBOSITY, 0) < 2:
-        return False
-    traceback.print_exc()
-    return True
-
-
 def print_any_character() -> None:
     """Let standard output escape characters that it has no code for, as standard error does."""
     for stream in (sys.stdout, sys.stderr):
@@ -181,21 +170,17 @@ def flush_stdout(*, quiet: bool) -> None:
     try:
         sys.stdout.flush()
     except BrokenPipeError:
-        silence_stdout()
+        _silence(sys.stdout)
         raise SystemExit(_CLOSED_OUTPUT) from None
     except OSError as error:
-        silence_stdout()
+        _silence(sys.stdout)
         if not quiet:
             complain(f"error: standard output: {error.strerror}")
             raise SystemExit(1) from None
 
 
-def silence_stdout() -> None:
-    """Point standard output at nothing, so that Python does not fail again when it closes it."""
-    _silence(sys.stdout)
-
-
 def _silence(stream: TextIO) -> None:
+    """Point a stream at nothing, so that Python does not fail again when it closes it."""
     with suppress(OSError, ValueError, AttributeError):
         nothing = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nothing, stream.fileno())

@@ -9,8 +9,8 @@ import click
 
 from adv2e.cli import options
 from adv2e.cli.commands import Command
-from adv2e.cli.progress import reading_told
 from adv2e.options import InfoOptions
+from adv2e.process.bars import reading_bar
 
 
 @click.command("info", cls=Command)
@@ -19,11 +19,7 @@ from adv2e.options import InfoOptions
 @options.declared_options(InfoOptions)
 @options.reporting_options
 def command(
-    file: Path,
-    as_json: bool,
-    given: dict[str, Any],
-    progress: bool,
-    log: options.Log,
+    file: Path, as_json: bool, given: dict[str, Any], progress: bool, log: options.Log
 ) -> None:
     """Show what a video, a recording or an event file holds.
 
@@ -40,7 +36,7 @@ def command(
     from adv2e.inspection.inspect import info
 
     log(f"reading {file}", 1)
-    with reading_told(file, progress) as told:
+    with reading_bar(file, progress) as told:
         report = info(file, progress=told, **given)
     if as_json:
         import json

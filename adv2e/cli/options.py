@@ -273,7 +273,6 @@ def declared_options(*groups: Any, help: Mapping[str, str] | None = None) -> Cal
 
 
 def _click_option(name: str, option: Option, help: str = "") -> Callable[[Body], Body]:
-    """Return the decorator of Click that adds one option that is declared."""
     about: dict[str, Any] = {"default": option.default, "metavar": option.metavar or None}
     text = f"{option.help} {help}".rstrip()
     if option.default == ():

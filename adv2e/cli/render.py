@@ -8,8 +8,8 @@ import click
 
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
-from adv2e.cli.progress import reading_told
 from adv2e.options import RenderOptions, check_together
+from adv2e.process.bars import reading_bar
 
 if TYPE_CHECKING:
     from adv2e.cli.options import Log
@@ -62,7 +62,7 @@ def command(
     from adv2e.rendering.render import chosen_style, reading_of
 
     style = chosen_style(output, given)
-    with reading_told(events, progress) as told:
+    with reading_bar(events, progress) as told:
         recording = read_events(events, progress=told, **reading_of(given))
     for problem in recording.problems:
         log(f"{events}: {problem}")

@@ -18,9 +18,9 @@ from adv2e.comparison.distances import (
     compact,
     distances,
     keys,
+    pooled,
     stride_of,
 )
-from adv2e.comparison.floor import Floor, half_split
 from adv2e.comparison.offset import latency_offset_us
 from adv2e.comparison.windows import Windows, fixed_windows, frame_windows, span_of
 from adv2e.errors import DataError, UsageError, warn
@@ -75,12 +75,8 @@ def stream_statistics(
     """Return the :data:`STATISTICS` of the events of a time [s], None where there is nothing."""
     count, on = len(events), int(np.count_nonzero(events["p"]))
     exposure = duration_s * width * height
-    values: list[float | None] = [
-        count,
-        on,
-        count - on,
-        *(n / exposure for n in (count, on, count - on)),
-    ]
+    counts = count, on, count - on
+    values: list[float | None] = [*counts, *(n / exposure for n in counts)]
     values.append(on / count if count else None)
     times = inter_event_times(events, width)
     if len(times):
@@ -98,6 +94,38 @@ def inter_event_times(events: Events, width: int) -> NDArray[np.int64]:
     same_pixel = ordered[1:] // stride == ordered[:-1] // stride
     times: NDArray[np.int64] = np.diff(ordered)[same_pixel]
     return times
+
+
+# ---- Noise floor of the distances: what they come to where nothing but chance differs.
+#
+# Each measured event goes to one of two halves by the toss of a coin. If events were a Poisson
+# process, the difference of the halves would be as large as that of one full draw from its own
+# rate, so the distance between the halves, over the norm of the whole, is how near the true rate
+# itself would come (a second draw lies sqrt 2 times as far). It needs no model. Pixels fire more
+# regularly than Poisson's, so that a model may come nearer.
+
+
+SPLITS = 4
+"""Half splits whose distances are averaged."""
+
+Floor = dict[str, float | None]
+"""A value for each measure, None where it is not defined."""
+
+
+def half_split(
+    measured: Events, windows: Windows, width: int, height: int, *, splits: int = SPLITS
+) -> Floor:
+    """Return the distances between two halves of the measured events, mean over `splits`.
+
+    The split draws from a generator of fixed seed: the same events give the same floor.
+    """
+    coin = np.random.default_rng(0)
+    found = []
+    for _ in range(splits):
+        heads = coin.random(len(measured)) < 0.5
+        halves = measured[heads], measured[~heads]
+        found.append(distances(*halves, windows, width, height, whole=measured).values)
+    return {name: pooled([one[name] for one in found], "mean") for name in MEASURES}
 
 
 DEFAULT_WINDOW_S = 0.05

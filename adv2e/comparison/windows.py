@@ -34,17 +34,14 @@ class Windows:
 
     @property
     def start(self) -> int:
-        """Start of the first window [us]."""
         return self.used[0][0]
 
     @property
     def stop(self) -> int:
-        """Stop of the last window [us]."""
         return self.used[-1][1]
 
     @property
     def duration_s(self) -> float:
-        """Time that all windows cover [s]."""
         return (self.stop - self.start) / 1e6
 
 

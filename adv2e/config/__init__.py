@@ -111,7 +111,6 @@ def _written(
     effects: Sequence[type[Hooks]],
     size: tuple[int, int] | None,
 ) -> tuple[type[Config], Value]:
-    """Return the class of a configuration, and what is written of it."""
     layers = _listed(files)
     configs = (layer for layer in layers if isinstance(layer, Config))
     own = {effect: None for config in configs for effect in user_effects(config).values()}
@@ -153,7 +152,6 @@ class Family:
         return build(self._section, merge(tree, _tree({"seed": seed}, Origin("--seed")))), numbers
 
     def written(self) -> dict[str, Any]:
-        """Return all keys, as :func:`to_dict` does, with the distributions in their places."""
         whole = replaced(_tree(to_dict(self.config), Origin()), self._distributions.forms)
         plain: dict[str, Any] = _plain(whole)
         return plain
@@ -216,7 +214,6 @@ def _merged(
     seed: int | None = None,
     size: tuple[int, int] | None = None,
 ) -> Value:
-    """Return the values of `files`, `sets`, `seed` and `size` merged, later ones on top."""
     over = [parse_set(text) for text in sets]  # what is wrong on the command line comes first
     if seed is not None:
         over.append(_tree({"seed": seed}, Origin("--seed", on_command_line=True)))

@@ -81,7 +81,6 @@ def _readout_hooks(readout: Readout, frames: Frames) -> Iterator[Hooks]:
 
 
 def user_hooks(config: Config) -> list[Hooks]:
-    """Return the effects of the user's own that are on in `config`."""
     user = getattr(config, "user", None)
     sections = ((effect, getattr(user, name)) for name, effect in user_effects(config).items())
     return [effect(section) for effect, section in sections if section is not None]

@@ -6,7 +6,6 @@ The declarations in :mod:`adv2e.config.model` are the schema: names, types, rang
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Iterator
 from dataclasses import MISSING
 from typing import Any, TypeVar
@@ -14,7 +13,7 @@ from typing import Any, TypeVar
 from adv2e.config.model import Config
 from adv2e.config.tree import form_text, is_form
 from adv2e.config.yaml12 import Value, scalar_text
-from adv2e.errors import Adv2eError, ConfigError
+from adv2e.errors import Adv2eError, ConfigError, did_you_mean
 from adv2e.parameters import Parameter, Section, kinds_of
 
 AnySection = TypeVar("AnySection", bound=Section)
@@ -39,12 +38,10 @@ class Key:
 
     @property
     def name(self) -> str:
-        """The last part of the path."""
         return self.path.rpartition(".")[2]
 
     @property
     def is_section(self) -> bool:
-        """True if the key is a section, with keys of its own."""
         return issubclass(self.kind, Section)
 
 
@@ -131,7 +128,6 @@ def _tuple(key: Key, value: Value) -> tuple[Any, ...]:
 
 
 def parts_of(key: Key) -> tuple[Key, ...]:
-    """Return the parts of a key that holds a list, each as a key of its own."""
     return tuple(
         dataclasses.replace(key, path=f"{key.path}[{n}]", kind=kind, parts=())
         for n, kind in enumerate(key.parts)
@@ -191,14 +187,9 @@ def _nearest(name: str, keys: dict[str, Key]) -> str:
     if above and name in {key.path for key in all_keys()}:
         nested = "".join(f"{part}: {{" for part in above)
         return f"each part by itself: {nested}{last}: ...{'}' * len(above)}"
-    near = difflib.get_close_matches(name, keys, n=1)
-    if near:
-        return f"did you mean '{near[0]}'?"
     elsewhere = {key.name: key.path for key in reversed(list(all_keys()))}
-    near = difflib.get_close_matches(name, elsewhere, n=1)
-    if near:
-        return f"did you mean '{elsewhere[near[0]]}'?"
-    return f"known here: {', '.join(keys)}" if keys else "this section has no keys"
+    near = did_you_mean(name, [*keys]) or did_you_mean(name, elsewhere)
+    return near or (f"known here: {', '.join(keys)}" if keys else "this section has no keys")
 
 
 def _placed(error: ConfigError, tree: Value, path: str) -> Adv2eError:

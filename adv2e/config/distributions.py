@@ -17,7 +17,6 @@ distribution more change what another key gets; and it is the same with every ve
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import hashlib
 import math
 import re
@@ -29,7 +28,7 @@ from typing import Any, TypeAlias
 from adv2e.config.build import Key, keys_of, parts_of
 from adv2e.config.tree import LAWS, TIE, form_text
 from adv2e.config.yaml12 import Value
-from adv2e.errors import Adv2eError
+from adv2e.errors import Adv2eError, did_you_mean
 from adv2e.parameters import Section
 
 Number: TypeAlias = "int | float"
@@ -43,7 +42,6 @@ _FORMS = (
 
 
 def replaced(tree: Value, by: Mapping[str, Value], path: str = "") -> Value:
-    """Return `tree` with other values at some paths."""
     if path in by:
         return by[path]
     content = tree.content
@@ -186,9 +184,8 @@ class Distributions:
         section, tree = self._section, self._tree
         known = {key.path: key for key in _all_numbers(section)}
         if wanted not in known:
-            near = difflib.get_close_matches(wanted, known, n=1)
-            hint = f", did you mean '{near[0]}'?" if near else ""
-            raise self._complaint(path, f"{wanted} is no key of a number{hint}")
+            hint = filter(None, [f"{wanted} is no key of a number", did_you_mean(wanted, [*known])])
+            raise self._complaint(path, ", ".join(hint))
         names, index = re.fullmatch(r"([^\[]+)(?:\[(\d+)\])?", wanted).groups()  # type: ignore[union-attr]
         here: Value | None = tree
         default: Any = MISSING
@@ -209,7 +206,6 @@ class Distributions:
 
 
 def _share(seed: int, path: str, attempt: int) -> float:
-    """Return a number between 0 and 1, neither of which it is."""
     digest = hashlib.sha256(f"{seed}\n{path}\n{attempt}".encode()).digest()
     return float(((int.from_bytes(digest[:8], "big") >> 12) + 0.5) / (1 << 52))
 
@@ -219,7 +215,6 @@ def _value(number: _Law | Number, seed: int, path: str, attempt: int) -> Number:
 
 
 def _numbers(section: type[Section], tree: Value, path: str = "") -> Iterator[tuple[Key, Value]]:
-    """Yield the keys of numbers that `tree` writes, and what it writes there."""
     if not isinstance(tree.content, dict):
         return
     for key in keys_of(section, path):
@@ -246,7 +241,6 @@ def _all_numbers(section: type[Section], path: str = "") -> Iterator[Key]:
 
 
 def _parsed(key: Key, value: Value) -> _Law | _Tie:
-    """Return the distribution that is written at a key."""
     content = value.content
     assert isinstance(content, dict)
     if key.path == "seed":

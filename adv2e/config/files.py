@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 import textwrap
 from collections.abc import Iterator, Mapping
@@ -14,8 +13,8 @@ from typing import Any
 from adv2e.config.build import Key, keys_of, parts_of
 from adv2e.config.model import Config
 from adv2e.config.yaml12 import Origin, Value, parse, scalar_text
-from adv2e.errors import ConfigError
-from adv2e.files.regular import read_text_bytes
+from adv2e.errors import ConfigError, did_you_mean
+from adv2e.files.regular import read_text
 from adv2e.parameters import Section
 
 
@@ -30,7 +29,6 @@ def shipped_folder() -> Path:
 
 
 def shipped() -> list[str]:
-    """Return the names of the shipped configurations, sorted."""
     return sorted(path.stem for path in shipped_folder().glob("*.yaml"))
 
 
@@ -93,11 +91,9 @@ def find(name: str | Path) -> Path:
         known = path.suffix in (".yaml", ".yml") and path.stem in shipped()
         hint = f" (the shipped one: -c {path.stem})" if known else ""
         raise ConfigError(f"{name}: no such file{hint}")
-    near = difflib.get_close_matches(path.name.lower(), shipped(), n=1)
-    hint = f", did you mean '{near[0]}'?" if near else ""
-    raise ConfigError(
-        f"{name}: no such file or shipped configuration{hint} (shipped: {', '.join(shipped())})"
-    )
+    near = did_you_mean(path.name.lower(), shipped())
+    what = ", ".join(filter(None, ["no such file or shipped configuration", near]))
+    raise ConfigError(f"{name}: {what} (shipped: {', '.join(shipped())})")
 
 
 def read(name: str | Path) -> Value:
@@ -109,13 +105,7 @@ def read(name: str | Path) -> Value:
         The file is missing, cannot be read, is not YAML, or is not a mapping of keys.
     """
     path = find(name)
-    try:
-        text = read_text_bytes(path, ConfigError).decode("utf-8-sig")
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: byte {error.start} is not UTF-8 text") from None
-    tree = parse(text, Origin(str(path)))
+    tree = parse(read_text(path, ConfigError), Origin(str(path)))
     if tree.content is None:  # nothing but comments
         return Value({}, tree.origin)
     if not isinstance(tree.content, dict):
@@ -142,9 +132,8 @@ def _plain(value: Any) -> Any:
 
 def to_yaml(config: Config) -> str:
     """Return the configuration as YAML that reads back as an equal one."""
-    return "".join(
-        f"{line}\n" for line, _ in _lines(type(config), config, "", "", {}) if not _is_comment(line)
-    )
+    lines = (line for line, _ in _lines(type(config), config, "", "", {}))
+    return "".join(f"{line}\n" for line in lines if not line.lstrip().startswith("#"))
 
 
 def to_annotated_yaml(config: Config, forms: Mapping[str, str] | None = None) -> str:
@@ -170,11 +159,7 @@ def to_annotated_yaml(config: Config, forms: Mapping[str, str] | None = None) ->
 
 
 def _lines(
-    section: type[Section],
-    values: Section | None,
-    indent: str,
-    path: str,
-    forms: Mapping[str, str],
+    section: type[Section], values: Section | None, indent: str, path: str, forms: Mapping[str, str]
 ) -> Iterator[tuple[str, str]]:
     """Yield each line of YAML and its comment; without `values`, those of a section that is off."""
     for key in keys_of(section, path):
@@ -199,10 +184,6 @@ def _text(key: Key, value: Any, forms: Mapping[str, str]) -> str:
         parts = zip(parts_of(key), value, strict=True)
         return f"[{', '.join(_text(part, number, forms) for part, number in parts)}]"
     return forms.get(key.path) or scalar_text(value)
-
-
-def _is_comment(line: str) -> bool:
-    return line.lstrip().startswith("#")
 
 
 def _note(key: Key) -> str:

@@ -33,7 +33,6 @@ def get_key(values: Mapping[str, Any], key: str) -> Any:
 
 
 def flat(values: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
-    """Return nested mappings as dotted keys."""
     result: list[tuple[str, Any]] = []
     for name, value in values.items():
         if isinstance(value, Mapping):
@@ -100,7 +99,6 @@ def is_form(value: Value) -> bool:
 
 
 def form_text(value: Value) -> str:
-    """Return a distribution in one line of YAML."""
     if isinstance(value.content, dict):
         items = (f"{key}: {form_text(item)}" for key, item in value.content.items())
         return f"{{{', '.join(items)}}}"

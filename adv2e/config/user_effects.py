@@ -23,7 +23,7 @@ from adv2e.config.build import Key, keys_of
 from adv2e.config.model import Config
 from adv2e.effects import STAGES
 from adv2e.effects.hooks import Hooks
-from adv2e.errors import ConfigError
+from adv2e.errors import ConfigError, one_line
 from adv2e.files.regular import read_text_bytes, shown
 from adv2e.parameters import Section, subsection
 
@@ -134,9 +134,8 @@ def _run(path: Path, source: bytes, name: str) -> ModuleType:
     except Exception as error:
         frames = traceback.extract_tb(error.__traceback__)
         lines = [frame.lineno for frame in frames if frame.filename == str(path)]
-        text = " ".join(str(error).split())
         raise ConfigError(
-            f"{path}:{lines[-1] if lines else 1}: {type(error).__name__}: {text}"
+            f"{path}:{lines[-1] if lines else 1}: {type(error).__name__}: {one_line(error)}"
         ) from error
     return module
 
@@ -147,7 +146,6 @@ def _line(effect: type[Hooks], source: bytes) -> int:
 
 
 def _complaint(effect: type[Hooks]) -> str | None:
-    """Return the error in the declaration of an effect, or None."""
     if not re.fullmatch(r"[a-z]\w*", effect.name):
         return f"name: must be lower-case letters, digits and underscores, got {effect.name!r}"
     if effect.stage not in STAGES:
@@ -173,7 +171,6 @@ _KINDS = (float, int, bool, str)
 
 
 def _key_complaint(key: Key) -> str | None:
-    """Return the error in the declaration of a parameter or of its fit, or None."""
     kinds = key.parts or (key.kind,)
     if not set(kinds) <= set(_KINDS):
         wanted = ", ".join(kind.__name__ for kind in _KINDS)

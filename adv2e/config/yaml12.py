@@ -135,7 +135,6 @@ class _Builder:
         return self.origin.at(node.start_mark.line + 1)
 
     def build(self, node: yaml.Node, path: str) -> Value:
-        """Return the value of `node`, which stands at the key `path`."""
         self.count += 1
         if self.count > _MOST:
             raise self.place(node).complaint(

@@ -12,7 +12,6 @@ from concurrent.futures import Future
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from numpy.typing import NDArray
@@ -94,7 +93,7 @@ class Decoding:
         return (frame.t_ns, light), picture
 
 
-class Reading:
+class Reading(ExitStack):
     """A source, and the reading of its frames; to be used as a context, once.
 
     With more than one thread, frames are read in a thread of their own from the beginning of the
@@ -115,10 +114,10 @@ class Reading:
     ) -> None:
         self.path, self.options = path, options
         self.threads = threads or default_threads()
+        super().__init__()
         self._opened: Source | Adv2eError | None = None
         self._decoding: Future[Decoding] = Future()
         self._decoded: Iterator[Decoded] = iter(())
-        self._at_end = ExitStack()
 
     @property
     def source(self) -> Source:
@@ -164,19 +163,11 @@ class Reading:
         self._decoded = _decoded(source.frames(), self._decoding)
         if self.threads > 1 and not source.waits:
             count = AHEAD_BYTES // (8 * source.width * source.height)
-            self._decoded = self._at_end.enter_context(
+            self._decoded = self.enter_context(
                 read_ahead(self._decoded, min(max(1, count), AHEAD_FRAMES))
             )
-            self._at_end.callback(self._decoding.cancel)  # its thread may wait for it
+            self.callback(self._decoding.cancel)  # its thread may wait for it
         return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._at_end.__exit__(kind, error, trace)
 
 
 def _decoded(frames: Iterator[Frame], decoding: Future[Decoding]) -> Generator[Decoded, None, None]:

@@ -137,7 +137,7 @@ def simulate(
             (t, fitting.light(now, f"frame {number}")) for number, (t, now) in enumerate(light)
         )
     made = events_from_light(
-        _shown(light, count) if progress else light,
+        bars.bar(iterable=light, total=count, unit=" frames") if progress else light,
         config,
         hooks=hooks,
         threads=threads,
@@ -169,14 +169,6 @@ def _filled(chunks: Iterator[Events]) -> Iterator[Events]:
         del chunk  # or it would stay while the next one is made
     if not is_any:
         yield nothing
-
-
-def _shown(light: Iterable[LightFrame], count: int | None) -> Frames:
-    """Yield the frames, with a progress bar on stderr."""
-    with bars.bar(total=count, unit=" frames") as bar:
-        for frame in light:
-            bar.update()
-            yield frame
 
 
 def _instants(times: Any, fps: Rate | None) -> tuple[Iterable[float], bool]:
@@ -262,7 +254,6 @@ def events_from_light(
     hooks: Sequence[Hooks] | None = None,
     threads: int | None = None,
     table: NDArray[np.float32] | None = None,
-    method: str = "auto",
     coarseness: Coarseness = PRECISE,
     complete: Callable[[int], None] | None = None,
     causes: bool = False,
@@ -271,7 +262,7 @@ def events_from_light(
 
     `hooks` are the effects that are on, in signal order; default: those of `config`.  With a
     `table` (:func:`adv2e.light.pictures.kernel_table`), the frames are grey values of 8 bits that
-    it decodes.  `method`, `coarseness`, `causes`: see :class:`adv2e.pixel.array.PixelArray`.
+    it decodes.  `coarseness`, `causes`: see :class:`adv2e.pixel.array.PixelArray`.
     `complete` is called now and then with a time [us] before which no event will come any more; not
     so if effects change events, as they may change times.
 
@@ -283,7 +274,7 @@ def events_from_light(
     hooks = active_hooks(config) if hooks is None else hooks
     if causes:
         check_causes(hooks)
-    if _change_events(hooks):
+    if any(overrides(hook, "events") for hook in hooks):
         complete = None
     frames = bounded(begin(hooks, iter(light), config.seed), table)
     made = _pixel_events(
@@ -293,15 +284,10 @@ def events_from_light(
         table,
         complete,
         threads=threads,
-        method=method,
         coarseness=coarseness,
         causes=causes,
     )
     yield from _limited(map_events(hooks, made, causes), config.max_events)
-
-
-def _change_events(hooks: Iterable[Hooks]) -> bool:
-    return any(overrides(hook, "events") for hook in hooks)
 
 
 def _limited(made: Iterator[Events], most: int) -> Iterator[Events]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,14 +22,14 @@ from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.errors import DataError
 from adv2e.files.regular import shown
 from adv2e.files.staging import Staging
-from adv2e.formats.event_file import EventFile, Progress
+from adv2e.formats.event_file import EventFile
 from adv2e.formats.reading import events_in_order, open_events, shots_of
 from adv2e.formats.registry import check_frames, to_write
 from adv2e.formats.writing import PACKAGES, Sink, open_sink
 from adv2e.geometry import Size
 from adv2e.light.pictures import picture_of, picture_white
 from adv2e.options import CopyOptions, EventInput, chosen, crop_of, takes
-from adv2e.process import bars
+from adv2e.process.bars import share_bar
 from adv2e.sources.frame import Frame, Light
 
 if TYPE_CHECKING:
@@ -80,7 +80,8 @@ def convert_events(
         raise DataError(
             f"{path}: its events have no causes; only 'adv2e convert --causes' has them"
         )
-    with _bar(path, options["progress"]) as facts.progress:
+    doing = f"looking through {Path(path).name}"
+    with share_bar(doing, "writing", options["progress"]) as facts.progress:
         size, first_us, parts = events_in_order(file)
         width, height = size
         crop = crop_of(options) or (0, 0, *size)
@@ -191,28 +192,3 @@ def copied_metadata(
         "converted": {"adv2e": __version__, **origin, **converted},
         **stored,
     }
-
-
-class _Bar:
-    """A bar on stderr for a file that is read twice."""
-
-    def __init__(self, path: str) -> None:
-        self._bar = bars.bar(desc=f"looking through {Path(path).name}")
-        self._bar.bar_format = "{desc}: {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
-
-    def __enter__(self) -> Progress:
-        return self._told
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.close()
-
-    def _told(self, done: int, total: int) -> None:
-        if done < self._bar.n:
-            self._bar.reset()
-            self._bar.set_description_str("writing")
-        self._bar.total = total
-        self._bar.update(done - self._bar.n)
-
-
-def _bar(path: str, progress: bool) -> Any:
-    return _Bar(path) if progress else nullcontext(lambda done, total: None)

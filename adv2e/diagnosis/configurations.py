@@ -18,7 +18,6 @@ from adv2e.reports.markup import Own, known_keys
 
 
 def with_keys(config: Config, keys: Mapping[str, Any]) -> Config:
-    """Return `config` with other values of some keys, given by their paths."""
     values = to_dict(config)
     for key, value in keys.items():
         set_key(values, key, value)
@@ -34,7 +33,6 @@ def from_values(values: dict[str, Any], name: str, like: Config) -> Config:
 
 
 def coupling_of(config: Config) -> FrameCoupling | None:
-    """Return the coupling of the frame readout to the pixels; None: the configuration has none."""
     return None if config.readout is None else config.readout.frame_coupling
 
 
@@ -98,7 +96,6 @@ def own_of(config: Config) -> Own:
 
 
 def _file_of(effect: type) -> str:
-    """Return the path of the file that defines an effect, "" where it is in no file."""
     return str(getattr(sys.modules.get(effect.__module__), "__file__", None) or "")
 
 

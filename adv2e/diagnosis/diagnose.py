@@ -30,7 +30,7 @@ from adv2e.diagnosis.outcome.verdict import conclude, detectable, remark_of
 from adv2e.diagnosis.prepare import DECLARED, prepare
 from adv2e.diagnosis.selection.search import Search
 from adv2e.diagnosis.simulation.affordable import affordable
-from adv2e.diagnosis.simulation.simulator import Progress, Simulator
+from adv2e.diagnosis.simulation.simulator import Simulator
 from adv2e.reports.result import Diagnosis
 
 
@@ -44,14 +44,13 @@ def diagnose(
     free_thresholds: bool = False,
     sizes: bool = True,
     threads: int | None = None,
-    progress: Callable[[Progress], None] = lambda now: None,
+    progress: Callable[[str, int], None] = lambda stage, simulations: None,
     log: Callable[[str], None] = lambda text: None,
 ) -> Diagnosis:
     """Find the effects that the declared model of a recording lacks.
 
     Parameters
     ----------
-    evidence : Evidence
     declared : Config
         What is known of the camera.  Effects of the user's own, for which it has sections, are
         candidates as the built-in ones are; those that are no knowledge of the camera are off
@@ -71,8 +70,8 @@ def diagnose(
     threads : int, optional
         Simulations at a time; default: all cores.  The result does not depend on it.
     progress : callable
-        Called with a :class:`~adv2e.diagnosis.simulation.simulator.Progress`, the stage and the
-        number of simulations done, at each new stage and after each simulation.
+        Takes the stage and the number of simulations done, at each new stage and after each
+        simulation.
     log : callable
         Takes lines for people.
 
@@ -120,11 +119,7 @@ def diagnose(
             detectable=detectable(reference, search.declared, search.candidates) if sizes else [],
             masked=evidence.masked,
             split=prepared.scene.split.text(),
-            notes=[
-                *evidence.notes,
-                *about_frames(prepared),
-                *about_drifts(evidence, kept.config),
-            ],
+            notes=[*evidence.notes, *about_frames(prepared), *about_drifts(evidence, kept.config)],
             model=as_found(of_frames_again(kept.config, given) if known else kept.config),
             facts={
                 "sensor": f"{evidence.width}x{evidence.height}",

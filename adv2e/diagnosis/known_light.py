@@ -114,7 +114,9 @@ def read_stimulus(path: str | Path, size: Size) -> tuple[Stimulus, Rectangle]:
     times_ns = _times_ns(table, time)
     light = np.stack([table.numbers(name, at_least=0.0, required=True) for name in names], axis=1)
     light *= _LIGHTS_DN[names[0].split()[0]]
-    _check_bright(table, names, light)
+    for row, column in np.argwhere(light > BRIGHTEST * _WHITE_DN)[:1].tolist():
+        most = f"must be at most {BRIGHTEST * _WHITE_DN:,.0f} DN, {BRIGHTEST:g} times white"
+        raise table.wrong(row, names[column], most)
     region, part = _regions(table.name, names, size)
     course = Stimulus(shown(path), times_ns, light, region)
     every = refined(times_ns, light)
@@ -144,13 +146,6 @@ def _check_columns(table: Table, time: str, names: list[str]) -> None:
             f"{table.name}: column {other[0]!r} is not known; one of light is named light_dn, or"
             " 'light_dn X Y COLUMNS ROWS' for a rectangle"
         )
-
-
-def _check_bright(table: Table, names: list[str], light_dn: NDArray[np.float64]) -> None:
-    most = BRIGHTEST * _WHITE_DN
-    for row, column in np.argwhere(light_dn > most)[:1].tolist():
-        text = f"must be at most {most:,.0f} DN, {BRIGHTEST:g} times white"
-        raise table.wrong(row, names[column], text)
 
 
 def _times_ns(table: Table, column: str) -> NDArray[np.int64]:

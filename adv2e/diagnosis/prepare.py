@@ -21,7 +21,7 @@ from adv2e.diagnosis.fitting.fitter import (
     thresholds_of,
 )
 from adv2e.diagnosis.fitting.library import library, of_known_light
-from adv2e.diagnosis.hints.collect import hints_of, looked_at_by
+from adv2e.diagnosis.hints.collect import hints_of, train_and_validation_events
 from adv2e.diagnosis.hints.own_period import own_period_of
 from adv2e.diagnosis.hints.readouts import has_pulse
 from adv2e.diagnosis.selection.reference import Reference
@@ -48,11 +48,8 @@ class Prepared:
 
     Attributes
     ----------
-    evidence : Evidence
-    scene : Scene
     reference : Reference
         Of the declared model, with thresholds that match the totals where they were not known.
-    candidates : list of Candidate
     between_frames, between_levels : FrameError, optional
         Of the statistics; None: too few frames to tell, and levels too fine to matter.
     """
@@ -103,7 +100,11 @@ def prepare(
             )
         simulator.begin(DECLARED)
     streams = simulator.streams(declared, PILOT_SEEDS)
-    own_period = None if known else own_period_of(looked_at_by(evidence, scene), evidence.times_s)
+    own_period = (
+        None
+        if known
+        else own_period_of(train_and_validation_events(evidence, scene), evidence.times_s)
+    )
     bursts = [since_burst(own_period.period_us, own_period.first.begins_us)] if own_period else []
     statistics = SummaryStatistics(scene, streams, bursts)
     by_seed = dict(zip(PILOT_SEEDS, streams, strict=True))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -16,7 +15,7 @@ from adv2e.diagnosis.data.evidence import part_of, read_evidence
 from adv2e.diagnosis.diagnose import diagnose as diagnose_evidence
 from adv2e.diagnosis.fitting.library import names
 from adv2e.diagnosis.known_light import read_known_light
-from adv2e.errors import UsageError
+from adv2e.errors import UsageError, did_you_mean
 from adv2e.options import DiagnoseOptions, EventInput, chosen, crop_of, size_of, takes
 from adv2e.process import bars
 from adv2e.reports.files import check_folder, write_reports
@@ -94,7 +93,7 @@ def diagnose_file(
     log: Callable[[str], None] = lambda text: None,
     **options: Unpack[DiagnoseOptions],
 ) -> Diagnosis:
-    """Do what :func:`diagnose` does, with a configuration that was loaded.
+    """Diagnose as :func:`diagnose` does, with a configuration that was loaded.
 
     `name` and `written` are what it was made from and the keys that somebody wrote; `also_read` are
     files that must not be written over; `log` takes lines for people, and `say` those that tell now
@@ -106,7 +105,9 @@ def diagnose_file(
     reading: EventInput = {**chosen(EventInput, options), **whole}
     del reading["size"]  # that of the sensor is in the configuration
     check_names(without, names(declared))
-    _check_own_names(declared)
+    for one in user_effects(declared):
+        if one in names():
+            raise UsageError(f"--effect: {one}: a built-in effect has that name; choose another")
     declared = without_user_effects(declared, written)
     if output is not None:
         inputs = [recording, *([] if light is None else [light]), *also_read]
@@ -126,7 +127,7 @@ def diagnose_file(
             free_thresholds=options["fit_thresholds"],
             threads=options["threads"],
             written=written,
-            progress=lambda now: tell(now.stage, now.simulations),
+            progress=tell,
             log=log,
         )
     if output is not None:
@@ -177,17 +178,7 @@ def _stages(shown: bool, say: Callable[[str], None] | None) -> Iterator[Callable
 
 
 def check_names(without: Sequence[str], known: Sequence[str]) -> None:
-    """Raise UsageError for an effect that is not known."""
     for name in without:
         if name not in known:
-            near = difflib.get_close_matches(name, known, n=1)
-            hint = f"did you mean '{near[0]}'?" if near else f"one of {', '.join(known)}"
+            hint = did_you_mean(name, known) or f"one of {', '.join(known)}"
             raise UsageError(f"--without {name}: no such effect, {hint}")
-
-
-def _check_own_names(config: Config) -> None:
-    """Raise UsageError for an effect of the user's own that has the name of a built-in one."""
-    known = names()
-    for name in user_effects(config):
-        if name in known:
-            raise UsageError(f"--effect: {name}: a built-in effect has that name; choose another")

@@ -43,7 +43,6 @@ class Effect:
 
     @property
     def module(self) -> ModuleType:
-        """Its module, imported when it is asked for."""
         name = self.own_module or self.name
         return importlib.import_module(f"adv2e.effects.{self.stage}.{name}")
 
@@ -52,7 +51,6 @@ class Effect:
         return inspect.getdoc(self.module) or ""
 
     def summary(self) -> str:
-        """Return the first line of its docstring."""
         return self.text().partition("\n")[0]
 
 
@@ -106,5 +104,4 @@ def _declared(name: str, table: str) -> str:
 
 
 def named() -> dict[str, Effect]:
-    """Return the effects by all of their names."""
     return {name: effect for effect in EFFECTS for name in (effect.name, *effect.told_as)}

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from adv2e.causes import CAUSED_DTYPE, FRAME_COUPLING, OWN_EFFECT, with_cause
 from adv2e.effects.hooks import INJECTED_DTYPE, Frames, Hooks, Times, View
-from adv2e.errors import Adv2eError, ConfigError, DataError
+from adv2e.errors import Adv2eError, ConfigError, DataError, one_line
 from adv2e.events import EVENT_DTYPE, Events
 
 Array = NDArray[Any]
@@ -31,13 +31,7 @@ COURSES: dict[str, tuple[str, int | None, np.ufunc]] = {
 
 
 def overrides(hook: Hooks, method: str) -> bool:
-    """Tell whether `hook` has a `method` of its own."""
     return getattr(type(hook), method) is not getattr(Hooks, method)
-
-
-def changes_light(hooks: Iterable[Hooks]) -> bool:
-    """Tell whether any of `hooks` has to see the light of the frames."""
-    return any(overrides(hook, "light") for hook in hooks)
 
 
 def begin(hooks: Sequence[Hooks], frames: Frames, seed: int) -> Frames:
@@ -84,7 +78,6 @@ def _is_timed(hook: Hooks) -> bool:
 
 
 def cause_of_signal(hooks: Sequence[Hooks]) -> int:
-    """Return the cause of events by what effects add to the signal."""
     return OWN_EFFECT if any(map(_is_own, _adding(hooks))) else FRAME_COUPLING
 
 
@@ -103,7 +96,6 @@ def _adding(hooks: Sequence[Hooks]) -> list[Hooks]:
 
 
 def _is_own(hook: Hooks) -> bool:
-    """Tell whether an effect is the user's own."""
     return not type(hook).__module__.startswith("adv2e.")
 
 
@@ -152,7 +144,6 @@ def _values(hook: Hooks, method: str, part: int | None, combine: np.ufunc, times
 
 
 def injected(hooks: Sequence[Hooks], start_s: float, stop_s: float) -> Array:
-    """Return the events that `hooks` inject, as INJECTED_DTYPE, sorted by time."""
     parts = [np.empty(0, INJECTED_DTYPE)]
     for hook in (hook for hook in hooks if overrides(hook, "inject")):
         with blamed(hook):
@@ -245,5 +236,5 @@ def blamed(hook: Hooks, source: _Watched | None = None) -> Iterator[None]:
         file = str(getattr(sys.modules.get(type(hook).__module__), "__file__", ""))
         lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
         where = f"{file}:{lines[-1]}: " if lines else ""
-        text = " ".join(str(error).split())
-        raise DataError(f"{where}effect {hook.name}: {type(error).__name__}: {text}") from error
+        what = f"effect {hook.name}: {type(error).__name__}"
+        raise DataError(f"{where}{what}: {one_line(error)}") from error

@@ -11,7 +11,6 @@ from adv2e.events import Events, empty_events, sort_events
 
 
 def count_before(events: Events, t_us: int) -> int:
-    """Return the number of the sorted events before a time [us]."""
     # NumPy's search would copy the column
     return bisect_left(range(events.size), t_us, key=lambda k: int(events["t"][k]))
 
@@ -49,7 +48,6 @@ class InOrder:
             yield events[:keep]
 
     def rest(self) -> Events:
-        """Return the events still held."""
         rest = empty_events() if self._held is None else self._held
         self._held = rest[:0]
         return rest

@@ -71,7 +71,6 @@ class Backlog:
         self._end += array.nbytes
 
     def take(self) -> NDArray[Any]:
-        """Remove the first array and return it."""
         _, item = self._items[0]
         if isinstance(item, _OnDisk):
             assert self._file is not None
@@ -84,7 +83,6 @@ class Backlog:
         return array
 
     def drop(self) -> None:
-        """Remove the first array."""
         _, item = self._items.popleft()
         if not isinstance(item, _OnDisk):
             self._held -= item.nbytes
@@ -95,7 +93,6 @@ class Backlog:
             self._end = 0
 
     def close(self) -> None:
-        """Let go of what is left."""
         self._items.clear()
         if self._file is not None:
             with suppress(OSError):  # what could not be written is not needed either

@@ -56,8 +56,18 @@ def read_text_bytes(path: Path, kind: type[Adv2eError] = DataError) -> bytes:
     return data
 
 
-def open_regular(path: Path, mode: str) -> BinaryIO | None:
-    """Return a file, opened without buffer; None: the name is that of something else, or a link.
+def read_text(path: Path, kind: type[Adv2eError] = DataError) -> str:
+    """Return the UTF-8 text in a file; an error of that kind if it cannot be read as such."""
+    try:
+        return read_text_bytes(path, kind).decode("utf-8-sig")
+    except OSError as error:
+        raise kind(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise kind(f"{path}: byte {error.start} is not UTF-8 text") from None
+
+
+def open_regular(path: Path) -> BinaryIO | None:
+    """Return a file, opened to be changed, without buffer; None: it is none, or a link.
 
     For files of our own in folders that may come from elsewhere.  A pipe is not waited for.
 
@@ -69,7 +79,7 @@ def open_regular(path: Path, mode: str) -> BinaryIO | None:
     extra = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     if path.is_symlink() or path.is_dir():
         return None
-    opened = open(path, mode, 0, opener=lambda name, flags: os.open(name, flags | extra))  # noqa: SIM115
+    opened = open(path, "r+b", 0, opener=lambda name, flags: os.open(name, flags | extra))  # noqa: SIM115
     file = cast(BinaryIO, opened)
     if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         return file
@@ -115,7 +125,6 @@ def expand(reader: Any, data: bytes, label: str, errors: tuple[type[Exception], 
     ----------
     reader : decompressor
         As those of :mod:`bz2` are, not used yet.
-    data : bytes
     label : str
         Name of the data, for messages.
     errors : tuple of exceptions

@@ -51,7 +51,6 @@ class _Output:
 
     @property
     def is_placed(self) -> bool:
-        """True if the output that was written has the final name."""
         return self.identity is not None and _identity_of(self.final) == self.identity
 
 
@@ -108,7 +107,6 @@ class Staging(signals.Unfinished):
 
         Parameters
         ----------
-        path : Path
         foreign : callable
             Names something in a folder that must not be lost by replacing it, or None.
 
@@ -274,7 +272,6 @@ class Staging(signals.Unfinished):
 
 
 def _identity_of(path: Path) -> Identity | None:
-    """Return the identity of the file or folder at `path`; None: there is none."""
     try:
         status = path.lstat()
     except OSError:

@@ -41,7 +41,6 @@ class State:
 
 
 def state_of(path: Path) -> State:
-    """Return the state of a file, or of a folder with all below it."""
     found = [file.stat() for _, file in _files(path)]
     return State(
         sum(one.st_size for one in found),
@@ -106,7 +105,6 @@ def check_distinct(output: str | Path, inputs: Iterable[str | Path]) -> None:
 
     Parameters
     ----------
-    output : str or Path
     inputs : iterable of str or Path
         All files that are read, and folders; names of nothing do not matter.
 

@@ -122,7 +122,6 @@ class Workspace:
 
     @property
     def is_made(self) -> bool:
-        """True if the folder was made."""
         return self._lock is not None
 
     def written(self, name: str) -> Path:
@@ -134,7 +133,6 @@ class Workspace:
         return self.path / _OLD / name
 
     def make(self) -> None:
-        """Make the folder and lock it."""
         lock = self.path / _LOCK
         while not lock.exists():  # again if, not locked yet, it looked abandoned to another run
             self.remove()
@@ -209,7 +207,7 @@ def _remove_if_abandoned(path: Path) -> str:
     if not os.path.lexists(file):
         path.rmdir()  # if it is empty: the run was killed before it could lock it
         return ""
-    lock = open_regular(file, "r+b")
+    lock = open_regular(file)
     if lock is None:
         return f"holds a {_LOCK} that is no file: no run made it; remove it if nobody needs it"
     with lock:

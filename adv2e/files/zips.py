@@ -45,9 +45,10 @@ def unpacking(trouble: str) -> Iterator[None]:
 
 
 @contextmanager
-def zip_archive(path: Path, kind: str = "a zip archive") -> Iterator[zipfile.ZipFile]:
-    """Open an archive; any fault of it, when it is opened or read, is a DataError."""
-    with unpacking(f"{path}: not {kind} that can be read"), zipfile.ZipFile(path) as archive:
+def numpy_archive(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open an ``.npz``; any fault of it, when it is opened or read, is a DataError."""
+    trouble = f"{path}: not a NumPy archive that can be read"
+    with unpacking(trouble), zipfile.ZipFile(path) as archive:
         yield archive
 
 
@@ -131,7 +132,6 @@ class Members:
         )
 
     def label(self, name: str) -> str:
-        """Return the name of a file for messages."""
         return str(self.path / name) if self._archive is None else f"{self.path}: {self._top}{name}"
 
     def size(self, name: str) -> int:
@@ -180,8 +180,6 @@ class Header:
 
     Attributes
     ----------
-    dtype : numpy.dtype
-    shape : tuple of int
     fortran : bool
         The first index runs fastest.
     begin : int
@@ -195,7 +193,6 @@ class Header:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the numbers."""
         return math.prod(self.shape) * self.dtype.itemsize
 
 
@@ -204,7 +201,6 @@ def read_header(file: IO[bytes], available: int, label: str) -> Header:
 
     Parameters
     ----------
-    file : binary file
     available : int
         Bytes in it, header included.
     label : str

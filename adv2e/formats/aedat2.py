@@ -175,7 +175,6 @@ def _header(path: Path) -> tuple[list[str], int]:
 
 
 def _value(lines: list[str], key: str) -> str:
-    """Return the value of a key in the header, or ''."""
     return next((line[len(key) :].strip() for line in lines if line.startswith(key)), "")
 
 
@@ -258,7 +257,6 @@ def _frames(path: Path, begin: int, size: tuple[int, int], facts: Facts) -> list
 
 
 def _load(path: Path, begin: int, frame: _Frame, size: tuple[int, int]) -> Frame:
-    """Return the image of a frame."""
     width, height = size
     read = np.full((2, height, width), -1, np.int32)
     left = frame.end - frame.begin
@@ -281,8 +279,7 @@ def _load(path: Path, begin: int, frame: _Frame, size: tuple[int, int]) -> Frame
 class Aedat2Writer(Writer):
     """Writes the events of a DAVIS in AEDAT-2.0; see :class:`Writer`."""
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        (path,) = temporary
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._file = stack.enter_context(path.open("wb"))
         self._last = request.width - 1, request.height - 1
         chip = _WRITTEN.get((request.width, request.height))

@@ -55,7 +55,7 @@ from adv2e.files.backlog import Backlog
 from adv2e.files.regular import expand
 from adv2e.formats.clock import shots_in_order
 from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry
-from adv2e.formats.writing import Request, Writer
+from adv2e.formats.writing import Pieces, Request, Writer
 from adv2e.light.pictures import eight_bit
 from adv2e.sources.frame import Frame, Shot, Track, counted
 from adv2e.ticks import US, check_time, check_us
@@ -421,8 +421,7 @@ _ROW = struct.pack("<7H", 14, 48, 16, 4, 24, 32, 40)
 class Aedat4Writer(Writer):
     """Writes an AEDAT4 file; its bytes follow from its content."""
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        (path,) = temporary
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._request = request
         try:
             self._lz4 = lz4_frame("")
@@ -432,18 +431,13 @@ class Aedat4Writer(Writer):
         self._text = "".join(self._xml()).encode("ascii")
         self._file.write(MAGIC + self._header(0))
         self._frames = stack.enter_context(closing(Backlog(path.parent)))
-        self._buffer = np.empty(_PACKET, EVENT_DTYPE)
-        self._held = 0  # events in it
+        self._pieces = Pieces(_PACKET, EVENT_DTYPE)
         self._rows: list[tuple[int, ...]] = []  # of the data table, without the first field
 
     def write_events(self, events: Events) -> None:
         """Append events."""
-        while events.size:
-            part, events = np.split(events, [_PACKET - self._held])
-            self._buffer[self._held : self._held + part.size] = part
-            self._held += part.size
-            if self._held == _PACKET:
-                self._write_packet()
+        for piece in self._pieces.add(events):
+            self._write_packet(piece)
 
     def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
         """Append a frame."""
@@ -451,16 +445,15 @@ class Aedat4Writer(Writer):
 
     def finish(self) -> None:
         """Write the remaining events and frames, and the data table."""
-        if self._held:
-            self._write_packet()
+        if (rest := self._pieces.take()).size:
+            self._write_packet(rest)
         self._write_frames(None)
         end = self._file.tell()
         self._file.write(self._packed(_data_table(self._rows)))
         self._file.seek(len(MAGIC))
         self._file.write(self._header(end))
 
-    def _write_packet(self) -> None:
-        held = self._buffer[: self._held]
+    def _write_packet(self, held: Events) -> None:
         self._write_frames(int(held["t"][0]))
         packet = np.zeros(held.size, EVENT)
         for name in ("t", "x", "y", "p"):
@@ -470,10 +463,8 @@ class Aedat4Writer(Writer):
         table += struct.pack("<iII", 6, 4, held.size) + packet.tobytes()
         first, last = int(held["t"][0]), int(held["t"][-1])
         self._write(_EVENT_STREAM, table, (held.size, first, last))
-        self._held = 0
 
     def _write_frames(self, until_us: int | None) -> None:
-        """Write the frames up to a time, or all."""
         while len(self._frames) and (until_us is None or self._frames.time(0) <= until_us):
             t_us = self._frames.time(0)
             image = self._frames.take()

@@ -66,7 +66,7 @@ from adv2e.files.staging import Staging
 from adv2e.formats.binary import DECODERS
 from adv2e.formats.clock import shots_in_order
 from adv2e.formats.event_file import MOST_COLUMNS, Columns, EventFile, Facts
-from adv2e.formats.writing import Request, Writer, to_json
+from adv2e.formats.writing import Pieces, Request, Writer, to_json
 from adv2e.light.pictures import eight_bit
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.frame import Frame, Shot, Track, counted
@@ -114,7 +114,6 @@ class _Cursor:
 
     Parameters
     ----------
-    data : bytes
     is_cdr : bool
         It is of ROS 2.
     label : str
@@ -145,7 +144,7 @@ class _Cursor:
         return self.bytes(self.number("I")).rstrip(b"\0").decode("utf-8", "replace")
 
     def bytes(self, count: int) -> bytes:
-        """Return so many bytes."""
+        """Return the next bytes; DataError if the message ends before."""
         if self._at + count > len(self._data):
             raise DataError(f"{self.label}: cut short: states {count:,} bytes")
         self._at += count
@@ -159,11 +158,6 @@ class _Cursor:
         stamp = seconds * NS_PER_S + self.number("I")
         self.string()
         return stamp
-
-
-def read_stamp(data: bytes, is_cdr: bool, label: str) -> int:
-    """Return the time in the header of a message [ns]."""
-    return _Cursor(data, is_cdr, label).stamp_ns()
 
 
 def read_event_array(data: bytes, is_cdr: bool, label: str) -> EventMessage:
@@ -421,7 +415,6 @@ class _Topic:
 
 
 def _topics(connections: list[Any]) -> list[_Topic]:
-    """Return the topics of the connections that the package found."""
     found: dict[tuple[str, str], list[Any]] = {}
     for connection in connections:
         found.setdefault((connection.topic, connection.msgtype), []).append(connection)
@@ -433,7 +426,6 @@ class _Bag:
 
     Attributes
     ----------
-    is_ros1 : bool
     settings : str
         What this program wrote inside, if it did.
     events_count : int
@@ -499,7 +491,7 @@ class _Bag:
         for number, (time, data) in enumerate(self._messages(self.images)):
             self._times.append(time)
             label = f"{self._path}: {self.images.name} message {number}"
-            t_ns = read_stamp(data, not self.is_ros1, label)
+            t_ns = _Cursor(data, not self.is_ros1, label).stamp_ns()
             check_time(t_ns, label)
             yield t_ns, label
 
@@ -575,12 +567,10 @@ class _BagWriter(Writer):
 
     _is_cdr = False
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        (path,) = temporary
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._request = request
         self._frames = stack.enter_context(closing(Backlog(path.parent)))
-        self._buffer = np.empty(_MESSAGE, EVENT_DTYPE)
-        self._held = 0  # events in it
+        self._pieces = Pieces(_MESSAGE, EVENT_DTYPE)
         try:
             import rosbags  # noqa: F401, PLC0415 - an optional package
         except ImportError:
@@ -595,11 +585,9 @@ class _BagWriter(Writer):
         }
 
     def _opened(self, path: Path) -> Any:
-        """Return a writer of the package."""
         raise NotImplementedError
 
     def _types(self) -> Any:
-        """Return the definitions of the messages."""
         from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: PLC0415
 
         types = get_typestore(Stores.ROS2_HUMBLE if self._is_cdr else Stores.ROS1_NOETIC)
@@ -612,12 +600,8 @@ class _BagWriter(Writer):
 
     def write_events(self, events: Events) -> None:
         """Append events."""
-        while events.size:
-            part, events = np.split(events, [_MESSAGE - self._held])
-            self._buffer[self._held : self._held + part.size] = part
-            self._held += part.size
-            if self._held == _MESSAGE:
-                self._write_held()
+        for piece in self._pieces.add(events):
+            self._write_piece(piece)
 
     def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
         """Append a frame."""
@@ -625,15 +609,14 @@ class _BagWriter(Writer):
 
     def finish(self) -> None:
         """Write the remaining events and frames, and close the bag."""
-        self._write_held()
+        self._write_piece(self._pieces.take())
         while len(self._frames):
             self._write_frame()
         bag, self._bag = self._bag, None
         bag.close()
 
-    def _write_held(self) -> None:
-        """Write the events held, and the frames among them."""
-        held = self._buffer[: self._held]
+    def _write_piece(self, held: Events) -> None:
+        """Write events, and the frames among them."""
         while held.size and len(self._frames):
             cut = int(np.searchsorted(held["t"] * 1000, self._frames.time(0)))
             if cut == held.size:
@@ -642,7 +625,6 @@ class _BagWriter(Writer):
             self._write_frame()
             held = held[cut:]
         self._write_events(held)
-        self._held = 0
 
     def _write_events(self, events: Events) -> None:
         if events.size:

@@ -372,8 +372,7 @@ def _split(block: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.int6
 class EsWriter(Writer):
     """Writes Event Stream; see :class:`Writer`."""
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        (path,) = temporary
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._file = stack.enter_context(path.open("wb"))
         size = np.array([request.width, request.height], "<u2").tobytes()
         self._file.write(_MAGIC + bytes(_VERSION) + bytes([_DVS]) + size)
@@ -486,8 +485,7 @@ def open_dat(path: Path, facts: Facts) -> EventFile:
 class DatWriter(Writer):
     """Writes DAT; see :class:`Writer`."""
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        (path,) = temporary
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._file = stack.enter_context(path.open("wb"))
         sizes = f"Width {request.width}", f"Height {request.height}"
         first = "Data file containing CD events."
@@ -590,10 +588,7 @@ def open_raw(path: Path, facts: Facts) -> EventFile:
     geometry = header.values.get("geometry", "").partition("x")
     header.tell(
         facts,
-        (
-            _size(options.get("width") or geometry[0]),
-            _size(options.get("height") or geometry[2]),
-        ),
+        (_size(options.get("width") or geometry[0]), _size(options.get("height") or geometry[2])),
     )
     begin = header.t0
 
@@ -819,8 +814,7 @@ DECODERS: dict[str, type[_Decoder]] = {
 class Evt2Writer(Writer):
     """Writes EVT 2.0; see :class:`Writer`."""
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        (path,) = temporary
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._file = stack.enter_context(path.open("wb"))
         self._file.write(raw_header(request, "2.0"))
         self._file.write(np.array([_HIGH << 28], "<u4").data)
@@ -848,8 +842,7 @@ class Evt2Writer(Writer):
 class Evt3Writer(Writer):
     """Writes EVT 3.0; see :class:`Writer`."""
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        (path,) = temporary
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._file = stack.enter_context(path.open("wb"))
         self._file.write(raw_header(request, "3.0"))
         self._high = self._low = self._row = -1

@@ -116,7 +116,7 @@ def unit_of_attribute(text: str) -> str | None:
 
 
 def named_geometry(values: Mapping[str, Any]) -> tuple[str, tuple[int, int] | None]:
-    """Return by what name values state the size of a sensor, and (width, height) [pixels].
+    """Return the name by which values state the size of a sensor, and (width, height) [pixels].
 
     None: they state none; the name is empty then.
     """
@@ -158,19 +158,13 @@ def _numbers(value: Any) -> tuple[int, int] | None:
     return (int(numbers[0]), int(numbers[1])) if max(numbers[:2]) <= _MOST else None
 
 
-def order_of(rows: NDArray[Any], usual: str = "txyp") -> str:
-    """Return the order of four columns without names, such as "xypt".
+def order_of(rows: NDArray[Any]) -> str:
+    """Return the order of four columns without names, (events, 4), such as "xypt".
 
     It is the usual one, unless the columns contradict it and fit one other alone: a single one
     holds but -1, 0 and 1, and another single one rises.
-
-    Parameters
-    ----------
-    rows : array of numbers, (events, 4)
-        Of the beginning of a file.
-    usual : str
-        What the columns are called where nothing speaks against it.
     """
+    usual = "txyp"
     if len(rows) < FEW:
         return usual
     rises = [bool(np.all(np.diff(column) >= 0) and column[-1] > column[0]) for column in rows.T]
@@ -264,7 +258,6 @@ def event_unit(
 
 
 def _is_rate(rate_hz: float, pixels: int) -> bool:
-    """Tell whether cameras have such a rate."""
     each = rate_hz / pixels
     few = each < _LEAST_RATE[0] and rate_hz < _LEAST_RATE[1]
     many = each > _MOST_RATE[0] and rate_hz > _MOST_RATE[1]

@@ -121,7 +121,6 @@ def _heading(path: Path, begin: bytes) -> tuple[list[str], int, int]:
 
 
 def _rows(begin: bytes) -> NDArray[np.float64]:
-    """Return the numbers of the first lines, if there are four in each; else none."""
     lines = _cleaned(begin[: begin.rfind(b"\n") + 1]).splitlines()
     try:
         rows = np.array([line.split() for line in lines if line.strip()], np.float64)
@@ -168,8 +167,7 @@ def _cleaned(block: bytes) -> bytes:
 class CsvWriter(Writer):
     """Writes a CSV of events."""
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        (path,) = temporary
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._file = stack.enter_context(path.open("wb"))
         self._file.write(_HEADING + (f",{_CAUSE}\n".encode() if request.causes else b"\n"))
 
@@ -180,7 +178,6 @@ class CsvWriter(Writer):
 
 
 def _lines(events: Events) -> bytes:
-    """Return the lines of some events."""
     numbers, triples = _tables()
     t = events["t"]
     left = np.abs(t)

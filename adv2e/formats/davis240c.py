@@ -115,7 +115,6 @@ def _image(files: Members, name: str) -> Frame:
 
 
 def _listed(files: Members, **evidence: Any) -> FrameList | None:
-    """Return the list of frames, or None without frames."""
     if not files.has(LIST):
         return None
     label = files.label(LIST)
@@ -207,9 +206,8 @@ def _foreign(folder: Path) -> str | None:
 class ZipWriter(_Davis240cWriter):
     """Writes the DAVIS240C files to a zip archive, whose bytes follow from its content."""
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         super().__init__(request, stack)
-        (path,) = temporary
         self._archive = stack.enter_context(
             zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL)
         )
@@ -251,7 +249,6 @@ class ZipWriter(_Davis240cWriter):
         self._add(DESCRIPTION, to_json(self._description).encode())
 
     def _add(self, name: str, data: bytes, method: int = zipfile.ZIP_DEFLATED) -> None:
-        """Add a member with the time that zip counts from."""
         info = zipfile.ZipInfo(name)
         info.compress_type = method
         info.external_attr = 0o644 << 16
@@ -261,8 +258,7 @@ class ZipWriter(_Davis240cWriter):
 class E2vidWriter(Writer):
     """Writes the text, or, to a path that ends in ``.zip``, a zip that holds it alone."""
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        (path,) = temporary
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._file: IO[bytes]
         if request.path.suffix.lower() == ".zip":
             archive = stack.enter_context(

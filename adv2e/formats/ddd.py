@@ -68,12 +68,7 @@ _ROWS = 64
 _SIZE = (346, 260)
 
 _EXPORTED = Layout(
-    name="ddd20",
-    events="event",
-    order="txyp",
-    frames="frame",
-    stamps="frame_ts",
-    stamps_ns=S,
+    name="ddd20", events="event", order="txyp", frames="frame", stamps="frame_ts", stamps_ns=S
 )
 """Layout of what is exported."""
 

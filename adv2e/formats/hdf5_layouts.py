@@ -235,7 +235,6 @@ class Layout:
         ]
 
     def _stack(self, file: h5py.File) -> h5py.Dataset | None:
-        """Return the dataset of the frames; None: there are none."""
         if hdf5.find(file, self.frames) is None:
             return None
         stack = hdf5.dataset(file, self.frames)
@@ -254,7 +253,6 @@ class Layout:
 
 
 def _whole(values: NDArray[Any], label: str) -> NDArray[Any]:
-    """Return coordinates as whole numbers."""
     if values.dtype.kind != "f":
         return values
     values = np.rint(values.astype(np.float64))
@@ -302,7 +300,6 @@ class _Images:
 
 
 def _stamp(path: Path, image: h5py.Dataset, name: str) -> NDArray[Any]:
-    """Return an array of the one number in an attribute."""
     if name in image.attrs:
         stamp = np.asarray(image.attrs[name])
         if stamp.size == 1 and stamp.dtype.kind in "iuf":
@@ -313,7 +310,6 @@ def _stamp(path: Path, image: h5py.Dataset, name: str) -> NDArray[Any]:
 
 
 def _shape(path: Path, image: h5py.Dataset) -> tuple[int, ...]:
-    """Return the shape of an image; DataError if it is none."""
     shape = tuple(image.shape)
     if len(shape) not in (2, 3) or (len(shape) == 3 and shape[2] not in (1, 3)) or 0 in shape:
         raise DataError(f"{path}: {image.name[1:]} is no image, but of shape {shape}")

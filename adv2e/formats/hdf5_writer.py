@@ -25,7 +25,7 @@ from adv2e.events import EVENT_DTYPE, Events
 from adv2e.files.backlog import Backlog
 from adv2e.formats import causes
 from adv2e.formats.hdf5_layouts import DSEC, M3ED, MONASH, MVSEC, V2E, Layout
-from adv2e.formats.writing import Request, Writer, compress, compress_shuffled, to_json
+from adv2e.formats.writing import Pieces, Request, Writer, compress, compress_shuffled, to_json
 from adv2e.light.pictures import eight_bit
 from adv2e.ticks import S
 
@@ -88,24 +88,21 @@ class Columns:
         self.size = 0
         self._work, self._columns, self._told = work, columns, told
         self._datasets = [_dataset(file, column) for column in columns]
-        self._buffer = np.empty(CHUNK, dtype)
-        self._held = 0
+        self._pieces = Pieces(CHUNK, dtype)
 
     def append(self, items: Values) -> None:
         """Add items at the end."""
-        while items.size:
-            part, items = np.split(items, [CHUNK - self._held])
-            self._buffer[self._held : self._held + part.size] = part
-            self._held += part.size
-            if self._held == CHUNK:
-                self.flush()
+        for chunk in self._pieces.add(items):
+            self._hand_over(chunk)
 
     def flush(self) -> None:
         """Hand over what waits for its chunk to be full: nothing may come after that."""
-        if not self._held:
-            return
-        items, begin = self._buffer[: self._held], self.size
-        self.size = end = begin + self._held
+        if (rest := self._pieces.take()).size:
+            self._hand_over(rest)
+
+    def _hand_over(self, items: Values) -> None:
+        begin = self.size
+        self.size = end = begin + items.size
         if self._told is not None:
             self._told(begin, items)
 
@@ -115,7 +112,6 @@ class Columns:
                 dataset.id.write_direct_chunk((begin,) + (0,) * (dataset.ndim - 1), data)
 
         self._work.submit(self._compressed, items, take=take)
-        self._held, self._buffer = 0, np.empty_like(self._buffer)
 
     def _compressed(self, items: Values) -> list[bytes]:
         chunks = []
@@ -151,8 +147,7 @@ class Hdf5Writer(Writer):
 
     layout: ClassVar[Layout]
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        (path,) = temporary
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self.request = request
         # fixed: the oldest structures, which every reader knows and which hold no times
         self.file = stack.enter_context(h5py.File(path, "w", libver=("earliest", "v108")))
@@ -196,7 +191,6 @@ class Hdf5Writer(Writer):
         return np.stack([self._stored(name, events) for name in self.layout.order], axis=1)
 
     def _stored(self, name: str, events: Events) -> Values:
-        """Return a column of some events as the layout has it."""
         if name == "t":
             return (
                 self.times_us(events) / 1e6 if self.layout.unit_ns == S else self.times_us(events)
@@ -256,7 +250,6 @@ class Hdf5Writer(Writer):
         return min(begin, self.size) + int(np.searchsorted(times, t))
 
     def _seconds(self, begin: int, end: int) -> Values:
-        """Return times of events as written [s]."""
         layout = self.layout
         part = self.file[layout.datasets[0]][begin:end]
         times: Values = part if layout.columns else part[:, layout.order.index("t")]

@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from adv2e.causes import CAUSED_DTYPE
 from adv2e.errors import DataError
 from adv2e.events import Events
-from adv2e.files.zips import Header, open_member, read_array, read_header, zip_archive
+from adv2e.files.zips import Header, numpy_archive, open_member, read_array, read_header
 from adv2e.formats.columns import SIZE_NAMES, find_columns, stated_unit
 from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.formats.writing import Request, Writer, to_json
@@ -66,7 +66,7 @@ def open_npz(path: Path, facts: Facts) -> EventFile:
         Not such an archive, a column is missing, or columns differ in length; from `parts`: they
         hold no whole numbers.
     """
-    with _archive(path) as archive:
+    with numpy_archive(path) as archive:
         headers = _headers(archive)
         held = {
             name: _read(archive, name)
@@ -135,12 +135,7 @@ def _file(
     return EventFile(layout, facts, parts, unit_ns=unit.ns, times=time)
 
 
-def _archive(path: Path) -> Any:
-    return zip_archive(path, "a NumPy archive")
-
-
 def _headers(archive: zipfile.ZipFile) -> dict[str, Header]:
-    """Return the headers of all arrays by their names."""
     headers = {}
     for member in archive.infolist():
         if member.filename.endswith(".npy"):
@@ -171,7 +166,7 @@ def _parts_of(
     path: Path, table: str, names: tuple[str, ...], count: int
 ) -> Iterator[tuple[NDArray[Any], ...]]:
     """Yield the columns, as :func:`_rows`."""
-    with _archive(path) as archive, ExitStack() as stack:
+    with numpy_archive(path) as archive, ExitStack() as stack:
         streams = {}
         for name in [table] if table else names:
             file = stack.enter_context(open_member(archive, f"{name}.npy"))
@@ -225,7 +220,6 @@ def _take(file: IO[bytes], dtype: np.dtype[Any], count: int, label: str) -> NDAr
 
 
 def _whole(label: str, name: str, column: NDArray[Any]) -> NDArray[np.int64]:
-    """Return a column of whole numbers, whatever their type."""
     if column.dtype.kind not in "biuf":
         raise DataError(f"{label}: {name} must hold numbers, not {column.dtype}")
     if column.dtype.kind == "f" and not np.array_equal(np.floor(column), column):
@@ -237,13 +231,13 @@ def _whole(label: str, name: str, column: NDArray[Any]) -> NDArray[np.int64]:
 
 def causes_of(path: Path) -> Callable[[], NDArray[Any]] | None:
     """Return a function that reads the causes of the events, None if the archive has none."""
-    with _archive(path) as archive:
+    with numpy_archive(path) as archive:
         there = f"{_CAUSES}.npy" in archive.namelist()
     return partial(_read_causes, path) if there else None
 
 
 def _read_causes(path: Path) -> NDArray[Any]:
-    with _archive(path) as archive:
+    with numpy_archive(path) as archive:
         causes = _read(archive, _CAUSES)
     if causes.ndim != 1:
         raise DataError(f"{path}: {_CAUSES} must be a column, not of shape {causes.shape}")
@@ -256,8 +250,7 @@ class NpzWriter(Writer):
     How many events there are stands before each column, so the columns wait on disk until then.
     """
 
-    def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
-        (path,) = temporary
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._request = request
         self._archive = stack.enter_context(
             zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL)
@@ -292,7 +285,6 @@ class NpzWriter(Writer):
     def _add(
         self, name: str, dtype: np.dtype[Any], shape: tuple[int, ...], data: IO[bytes]
     ) -> None:
-        """Add an array with the time that zip counts from."""
         info = zipfile.ZipInfo(f"{name}.npy")
         info.compress_type = zipfile.ZIP_DEFLATED
         info.external_attr = 0o644 << 16

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from adv2e import __version__
 from adv2e.background import default_threads
@@ -233,6 +233,28 @@ class Writer(ABC):
         """Write the remaining events and frames."""
 
 
+class Pieces:
+    """Gathers items to pieces of `count`, so that a file does not depend on how they come."""
+
+    def __init__(self, count: int, dtype: DTypeLike) -> None:
+        self._buffer, self._held = np.empty(count, dtype), 0
+
+    def add(self, items: NDArray[Any]) -> Iterator[NDArray[Any]]:
+        """Take items, and yield the pieces that are full."""
+        while items.size:
+            part, items = np.split(items, [self._buffer.size - self._held])
+            self._buffer[self._held : self._held + part.size] = part
+            self._held += part.size
+            if self._held == self._buffer.size:
+                yield self.take()
+
+    def take(self) -> NDArray[Any]:
+        """Return what is held, less than a piece, which nobody writes to any more."""
+        held = self._buffer[: self._held]
+        self._buffer, self._held = np.empty_like(self._buffer), 0
+        return held
+
+
 class Sink:
     """Takes the events and frames of one recording, inside a ``with`` block.
 
@@ -310,11 +332,7 @@ class Sink:
 
     @contextmanager
     def _opened(
-        self,
-        writer: Callable[..., Writer],
-        staging: Staging,
-        temporary: list[Path],
-        is_alone: bool,
+        self, writer: Callable[..., Writer], staging: Staging, temporary: list[Path], is_alone: bool
     ) -> Iterator[Writer]:
         with staging if is_alone else nullcontext(), _closing() as stack:
             with writing(self._name):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from adv2e.config.model import Frames, Sampling
-from adv2e.effects.composition import changes_light
+from adv2e.effects.composition import overrides
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.effects.hooks import Hooks
 from adv2e.light.sensor import Fitting
@@ -40,8 +40,9 @@ def kernel_table(
     A quarter of the memory traffic, but every instant looks its frames up again, and only linear
     interpolation, of frames as they are, without effects on the light (`hooks`), needs none before.
     """
-    once = sampling.L == 1 and sampling.interpolation == "linear" and not changes_light(hooks)
-    return decoder.grey_table if once and fitting is None else None
+    once = sampling.L == 1 and sampling.interpolation == "linear" and fitting is None
+    as_read = once and not any(overrides(hook, "light") for hook in hooks)
+    return decoder.grey_table if as_read else None
 
 
 def light_text(light: Light, white: float, frames: Frames | None = None) -> str:

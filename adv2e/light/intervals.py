@@ -77,7 +77,6 @@ class Intervals:
     ----------
     t_ns, first : int, (rows, columns)
         Time and light, or grey values, of the first frame.
-    sampling : Sampling
     threads : int
         For interpolations that take their time.
     """
@@ -125,7 +124,6 @@ class Intervals:
             yield self._part(len(self._instants) - 1)
 
     def _checked(self, frames: Iterator[LightFrame]) -> Iterator[LightFrame]:
-        """Yield the frames as they are."""
         number, before_ns = 0, self._first[0]
         for number, (now_ns, now) in enumerate(frames, start=1):
             if now_ns <= before_ns:
@@ -155,7 +153,6 @@ class Intervals:
         return self._count - 2
 
     def _cut(self, frames: Iterator[LightFrame]) -> Iterator[_Instant]:
-        """Yield the instants of all intervals."""
         upsampler = self._upsampler
         if upsampler is None:
             count = self._L

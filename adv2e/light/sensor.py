@@ -87,7 +87,6 @@ class Fitting:
 
     Parameters
     ----------
-    frames : Size
     sensor : Sensor
         The section of the configuration.
     label : str

@@ -112,7 +112,6 @@ def _log_light(a: NDArray[Any], b: NDArray[Any]) -> tuple[Image, Image]:
 
 
 def _flow(ga: Image, gb: Image) -> list[tuple[Image, Image]]:
-    """Return (u, v) from a to b and from b to a."""
     low = min(float(ga.min()), float(gb.min()))
     span = max(float(ga.max()), float(gb.max())) - low
     # a picture of hardly any contrast is not stretched: that would be flow of its noise
@@ -344,7 +343,6 @@ def _bend(own: Plane, others: Plane, motion: Motion, spans: tuple[float, float])
 
 
 def _between(value: NDArray[Any], low: float, high: float) -> NDArray[Any]:
-    """Return 0 up to `low`, 1 from `high` on."""
     return np.clip((value - low) / (high - low), 0.0, 1.0)
 
 

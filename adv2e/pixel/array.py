@@ -55,12 +55,10 @@ class PixelArray:
     ----------
     pixel, sampling
         The configuration's sections.
-    seed : int
     first : (rows, columns) float
         Light of the first frame [DN].
     t_ns : int
         Its time.
-    threads : int, optional
     tile : int, optional
         Most pixels that one call of the kernel advances; the events do not depend on it.
     exact_times : bool

@@ -76,7 +76,6 @@ def _sorted_slices(
     pool: ThreadPoolExecutor | None,
     causes: bool,
 ) -> Events:
-    """Return the sorted events of the slices first..last."""
     begin = ends[first]
     events = np.empty(int(ends[last] - begin), CAUSED_DTYPE if causes else EVENT_DTYPE)
     # as many slices at a time as sort in cache

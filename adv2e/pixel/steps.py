@@ -118,10 +118,8 @@ class Stepping:
 
     Parameters
     ----------
-    circuit : Circuit
     pixels : int
         Those that are advanced: the first so many.
-    columns : int
     hooks : sequence of Hooks
         Effects that act inside the pixel.
     drift_per_s : float
@@ -130,7 +128,6 @@ class Stepping:
         Time that the pixel array counts from, on the recording's clock.
     start_us : float
         Time of the first frame, from there.
-    coarseness : Coarseness
     """
 
     def __init__(
@@ -186,7 +183,7 @@ class Stepping:
         if exact:
             brightest, ends_s = _brightest(part, frames, lengths.size), self._seconds(starts)
             for f, length in enumerate(lengths):
-                step_us = self._longest_step_us(ends_s[f], ends_s[f + 1])
+                step_us = longest_step_us(self._hooks, float(ends_s[f]), float(ends_s[f + 1]))
                 steps[f] = steps_of(
                     length / pieces, circuit, step_us, brightest[f], self._coarseness
                 )
@@ -213,10 +210,6 @@ class Stepping:
                 border = (f + 1, stop)
         yield (*begin, *border)
 
-    def _longest_step_us(self, start_s: float, stop_s: float) -> float:
-        """Return the longest step that resolves what is added between two times [us]."""
-        return longest_step_us(self._hooks, float(start_s), float(stop_s))
-
     def _course(self, name: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a course at times since the origin [us], without rows if there is none."""
         values = course(self._hooks, name, self._seconds(times))
@@ -231,7 +224,6 @@ class Stepping:
         return drift * factors if factors.size else drift
 
     def _injected(self, t0_us: float, t1_us: float) -> Injected:
-        """Return the events that are injected in a run."""
         if not any(overrides(hook, "inject") for hook in self._hooks):
             return _NOTHING
         t0, t1 = (float(t) for t in self._seconds(np.array([t0_us, t1_us])))

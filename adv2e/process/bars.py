@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -34,3 +36,34 @@ def bar(**options: Any) -> tqdm[Any]:
     from tqdm import tqdm  # noqa: PLC0415 - it takes its time, and most runs in scripts need none
 
     return tqdm(file=_Unfailing(), leave=False, **options)
+
+
+@contextmanager
+def share_bar(doing: str, then: str, is_shown: bool) -> Iterator[Callable[[int, int | None], None]]:
+    """Yield a callback (amount done, total or None) for a bar that shows the share of a file.
+
+    Once all of it is done the bar says `then`: a second pass, or work that has no share.
+    """
+    if not is_shown:
+        yield lambda done, total: None
+        return
+    with bar(desc=doing, unit=" frames") as shown:
+
+        def tell(done: int, total: int | None) -> None:
+            if total is not None:
+                shown.total = total
+                shown.bar_format = "{desc}: {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
+            if done < shown.n:
+                shown.reset(total)
+            shown.update(done - shown.n)
+            if done == total:
+                shown.set_description_str(then)
+
+        yield tell
+
+
+def reading_bar(
+    path: str | Path, is_shown: bool
+) -> AbstractContextManager[Callable[[int, int | None], None]]:
+    """Return the bar of a file whose events are sorted and counted once they are read."""
+    return share_bar(f"reading {Path(path).name}", "sorting and counting", is_shown)

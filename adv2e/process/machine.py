@@ -12,6 +12,8 @@ import gc
 import re
 from contextlib import suppress
 
+from adv2e.errors import one_line
+
 _SIGNS = re.compile(
     r"failed to map segment|cannot allocate memory|can't start new thread|bad_alloc"
     r"|insufficient memory|failed to allocate|out of memory|unable to allocate"
@@ -23,7 +25,7 @@ _SIGNS = re.compile(
 
 def machine_complaint(error: BaseException) -> str:
     """Return the message for an exception that the machine's limits caused, or ""."""
-    told = " ".join(str(error).split())
+    told = one_line(error)
     of_limits = isinstance(error, MemoryError) or (
         isinstance(error, OSError) and error.errno in (errno.ENOMEM, errno.EAGAIN)
     )

@@ -75,12 +75,7 @@ def stopping_on_signals() -> Iterator[None]:
 
 
 class Interrupt:
-    """The first SIGINT, which ends nothing by itself; see :func:`first_interrupt`.
-
-    Attributes
-    ----------
-    came : bool
-    """
+    """The first SIGINT, which ends nothing by itself; see :func:`first_interrupt`."""
 
     def __init__(self, wakes: int) -> None:
         self.came = False
@@ -164,7 +159,6 @@ def _woken() -> Iterator[int]:
 
 
 def _usual() -> dict[int, Callable[[int, FrameType | None], object] | signal.Handlers]:
-    """Return the signals and Python's own handlers for them."""
     names: dict[str, Callable[[int, FrameType | None], object] | signal.Handlers] = {
         "SIGINT": signal.default_int_handler,
         "SIGTERM": signal.SIG_DFL,
@@ -174,7 +168,6 @@ def _usual() -> dict[int, Callable[[int, FrameType | None], object] | signal.Han
 
 
 def last_words(ending: BaseException) -> str:
-    """Return the last message of a program that a signal ends."""
     return f"stopped by {ending}" if isinstance(ending, Terminated) else "interrupted"
 
 
@@ -207,12 +200,10 @@ _listed: dict[int, Unfinished] = {}
 
 
 def add(thing: Unfinished) -> None:
-    """Have `thing` removed if a signal comes."""
     _listed[id(thing)] = thing
 
 
 def drop(thing: Unfinished) -> None:
-    """Forget `thing`, if it is known at all."""
     _listed.pop(id(thing), None)
 
 

@@ -21,7 +21,6 @@ _heard = -1
 
 
 def errors_descriptor() -> int:
-    """Return the descriptor of standard error."""
     return _descriptor
 
 

@@ -53,7 +53,6 @@ class _File(io.FileIO):
     error: OSError | None = None
 
     def write(self, data: Any) -> int:
-        """Write all of the bytes, or nothing more after an error."""
         left = memoryview(data).cast("B")
         try:
             while self.error is None and left.nbytes:
@@ -96,7 +95,8 @@ class VideoFile:
             if self._container is None:
                 self._open(frame.width, frame.height)
             self._container.mux(self._stream.encode(frame))
-            self._check()
+            if self._file.error is not None:
+                raise self._file.error
         self._count += 1
 
     def _frame(self, picture: Picture) -> av.VideoFrame:
@@ -107,7 +107,6 @@ class VideoFile:
         return av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
 
     def _open(self, width: int, height: int, **more: str) -> None:
-        """Open the file for pictures of a size, with `more` options of the container."""
         kind, coder, pixels, options = CODERS[self._path.suffix.lower()]
         # FFmpeg takes parts of names for addresses and patterns
         self._file = _File(self._path, "wb")
@@ -117,10 +116,6 @@ class VideoFile:
         self._stream.pix_fmt = pixels
         if coder == "libvpx":
             self._stream.bit_rate = _VP8_BITS
-
-    def _check(self) -> None:
-        if self._file.error is not None:
-            raise self._file.error
 
     def finish(self) -> None:
         """Complete the file and check that it holds all pictures."""
@@ -145,7 +140,6 @@ class VideoFile:
                 self._size = file.seek(0, 2)
 
     def close(self) -> None:
-        """Let go of the file, complete or not."""
         with suppress(Exception):  # what led here says more
             self._complete()
 
@@ -295,16 +289,13 @@ class Film:
         return number
 
     def add(self, number: int, cell: Cell) -> None:
-        """Append the cell."""
         scale = self._scale or default_scale(cell.panels[0].shape[1])
         self._file.add(compose(cell, scale, self._style))
 
     def finish(self) -> None:
-        """Complete the file."""
         self._file.finish()
 
     def close(self) -> None:
-        """Let go of the file."""
         self._file.close()
 
 
@@ -331,14 +322,12 @@ class Sheet:
         return -(-(number + 1) // self._stride) * self._stride - 1
 
     def add(self, number: int, cell: Cell) -> None:
-        """Take the cell."""
         self._cells[number] = cell
         while (number + 1) // self._stride > _KEPT * self._count:
             self._stride *= 2  # so that those held are among those held before
         self._cells = {n: cell for n, cell in self._cells.items() if self.wanted_from(n) == n}
 
     def finish(self) -> None:
-        """Choose the cells and write the picture."""
         cells = list(self._cells.values())
         shown = min(self._count, len(cells))
         places = [int((n + 0.5) * len(cells) / shown) for n in range(shown)]  # evenly spread
@@ -349,7 +338,6 @@ class Sheet:
         self._path.write_bytes(data.tobytes())
 
     def close(self) -> None:
-        """Forget the cells."""
         self._cells.clear()
 
 

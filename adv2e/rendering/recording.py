@@ -44,7 +44,6 @@ def render_recording(
 
     Parameters
     ----------
-    recording : Recording
     path : str or Path
         Output.
     style, frames, caption
@@ -160,7 +159,7 @@ def open_preview(
     staging: Staging | None = None,
     **options: Unpack[FilmOptions],
 ) -> Iterator[Timeline]:
-    """Give the body what takes events and frames, and write them as a film or a sheet.
+    """Yield a timeline that takes events and frames, and write a film or a contact sheet of them.
 
     Events are sorted and so are frames; which of them come first, and in which pieces, makes no
     difference.  If the body ends well the file is completed; otherwise there is none.

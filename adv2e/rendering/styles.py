@@ -49,9 +49,6 @@ COLOURS: dict[str, Colour] = {
 GREY_CLIP = 3
 """Net count at which the grey style is black or white."""
 
-_WHITE = (255, 255, 255)
-_BLACK = (0, 0, 0)
-
 
 @dataclass(frozen=True, kw_only=True)
 class Style:
@@ -68,12 +65,11 @@ class Style:
 
     @property
     def background(self) -> Colour:
-        """The colour of a pixel without events."""
-        return {"black": _BLACK, "grey": _grey_levels(0)}.get(self.name, _WHITE)
+        paper = COLOURS["black" if self.name == "black" else "white"]
+        return _grey_levels(0) if self.name == "grey" else paper
 
     @property
     def colours(self) -> tuple[Colour, Colour]:
-        """The colours of ON and OFF."""
         if self.name == "grey":
             return _grey_levels(GREY_CLIP), _grey_levels(-GREY_CLIP)
         return self.on, self.off
@@ -106,7 +102,6 @@ def draw(events: Events, width: int, height: int, t_us: int, style: Style | None
         Size [pixels].
     t_us : int
         The instant [us].
-    style : Style, optional
 
     Returns
     -------
@@ -249,7 +244,6 @@ def _scaled(picture: Picture, scale: float) -> Picture:
 
 
 def _paper(style: Style) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
-    """Return the colours of paper and ink around the panels."""
     if style.name == "black":
         return (28, 28, 28), (225, 225, 225)
     return (240, 240, 240), (20, 20, 20)

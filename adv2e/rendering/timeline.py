@@ -33,7 +33,6 @@ _LONG_AGO, _FAR_OFF = -(1 << 62), 1 << 62
 
 
 def caption(since_us: int, count: int) -> str:
-    """Return time and number of events."""
     return f"{since_us * 1e-6:.3f} s   {count:,} events"
 
 
@@ -50,7 +49,6 @@ class Timeline:
         Takes the pictures.
     size : (int, int)
         Width and height of the sensor [pixels].
-    style : Style
     step_us : float
         Time between the instants [us].
     instants_us : sequence of int, optional
@@ -145,7 +143,6 @@ class Timeline:
         return True
 
     def close(self) -> None:
-        """Let go of what waits on disk."""
         self._coming.close()
         self._frames.close()
 
@@ -187,7 +184,6 @@ class Timeline:
         self._drop_frames(next_us)
 
     def _draw(self, t_us: int) -> None:
-        """Draw the instant `t_us`."""
         assert self._start_us is not None
         while self._coming and not (self._events.size and self._events["t"][-1] >= t_us):
             self._events = np.concatenate([self._events, self._coming.take()])
@@ -213,10 +209,10 @@ class Timeline:
             self._frames.drop()
 
     def _frame_at(self, t_us: int) -> Picture:
-        """Return the last frame at or before `t_us`, or a grey panel."""
         self._drop_frames(t_us)
         if self._frames and self._frames.time(0) <= t_us:
-            self._shown = _panel(self._frames.take())
+            image = self._frames.take()
+            self._shown = image if image.ndim == 3 else np.repeat(image[:, :, None], 3, axis=2)
         if self._shown is None:
             self._shown = np.full((self._size[1], self._size[0], 3), 128, np.uint8)
         return self._shown
@@ -228,8 +224,3 @@ def _reduced(image: NDArray[Any], size: tuple[int, int]) -> Picture:
     if image.shape[1::-1] != size:
         image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     return image.astype(np.uint8, copy=False)
-
-
-def _panel(image: Picture) -> Picture:
-    """Return a frame, grey or in colours, in colours."""
-    return image if image.ndim == 3 else np.repeat(image[:, :, None], 3, axis=2)

@@ -38,7 +38,6 @@ class _Frame:
     x: Floats
 
     def line(self, values: Floats) -> str:
-        """Return the path of a curve."""
         xs, ys = points_of(self.x, self.up.place(values))
         return line_path(xs, ys)
 
@@ -102,7 +101,6 @@ def _unlike(curve: Curve) -> float:
 
 
 def _legend(wording: Wording, *, two: bool) -> Markup:
-    """Return the legend of all curves: lines and bands."""
     entries = [("measured", "measured"), ("before", "before: the declared model")]
     if two:
         entries.append(("after", "after: the model found"))
@@ -228,11 +226,7 @@ def _joined(xs: Floats, ys: Floats) -> str:
 # ---- The errors before and after, beside the floor, as bars that are as wide as the page.
 
 
-_MEANINGS = {
-    "before": "declared model",
-    "after": "model found",
-    "floor": "chance alone",
-}
+_MEANINGS = {"before": "declared model", "after": "model found", "floor": "chance alone"}
 """Meaning of each bar: its model, or chance."""
 
 
@@ -278,9 +272,6 @@ def _percent(part: float, whole: float) -> str:
 # ---- Axes: from values to places in a picture, their ticks and labels, and how they are drawn.
 
 
-# ---- Places and labels of the ticks of an axis.
-
-
 def linear_ticks(low: float, high: float, most: int = 6) -> list[float]:
     """Return multiples of 1, 2 or 5 times a power of ten from `low` to `high`, ascending.
 
@@ -313,7 +304,6 @@ def log_ticks(low: float, high: float, most: int = 7) -> list[float]:
 
 
 def tick_labels(ticks: Sequence[float]) -> list[str]:
-    """Return the labels of `ticks`, each right to a part in a million of their distance."""
     gap = min((b - a for a, b in itertools.pairwise(ticks)), default=0.0)
     labels: list[str] = []
     for digits in range(6, 18):
@@ -364,11 +354,9 @@ class Axis:
         return places
 
     def at(self, value: float) -> float:
-        """Return the position of one value on the axis."""
         return float(self.place(np.asarray(value, dtype=np.float64)))
 
     def ticks(self) -> list[tuple[float, str]]:
-        """Return places in the picture and labels."""
         if self.names:
             return [(self.at(value), name) for value, name in self.names]
         ticks = log_ticks(self.low, self.high) if self.log else linear_ticks(self.low, self.high)
@@ -418,17 +406,14 @@ def _log_axis(low: float, high: float, start: float, end: float, tight: bool) ->
 
 
 def wrapped(text: str, width: float) -> list[str]:
-    """Return `text` in lines of about `width`."""
     return textwrap.wrap(text, max(8, int(width / _CHARACTER))) or [""]
 
 
 def place_text(x: float, y: float, content: str, **attributes: object) -> Markup:
-    """Return `content` with its base line at (x, y)."""
     return tag("text", content, x=f"{x:.1f}", y=f"{y:.1f}", **attributes)
 
 
 def rule(x0: float, y0: float, x1: float, y1: float, class_: str) -> Markup:
-    """Return a straight line."""
     return tag(
         "line", x1=f"{x0:.1f}", y1=f"{y0:.1f}", x2=f"{x1:.1f}", y2=f"{y1:.1f}", class_=class_
     )
@@ -468,9 +453,6 @@ def _apart(ticks: list[tuple[float, str]]) -> list[tuple[float, str]]:
     return kept
 
 
-# ---- Pictures of the sensor (PNG inside the page): events of a short time, and residuals.
-
-
 # ---- Events of a short time as pictures (PNG inside the page), in colours that compare.
 
 
@@ -482,9 +464,7 @@ _LOUD = 0.99
 
 def top_of(snapshot: Snapshot) -> int:
     """Return the number of events of a pixel that has full colour in all pictures."""
-    every = np.concatenate(
-        [one.ravel() for one in (snapshot.measured, snapshot.before, snapshot.after)]
-    )
+    every = np.array([snapshot.measured, snapshot.before, snapshot.after])
     some = every[every > 0]
     return int(np.quantile(some, _LOUD, method="lower")) if some.size else 1
 
@@ -502,11 +482,6 @@ def event_colours(number: NDArray[Any], top: int) -> NDArray[np.uint8]:
     return np.asarray(np.rint(255.0 * light), np.uint8)
 
 
-def event_picture(number: NDArray[Any], top: int, description: str) -> Markup:
-    """Return numbers of OFF and ON events, (2, rows, columns), as an ``img`` element."""
-    return image_of(event_colours(number, top), description)
-
-
 # ---- Residuals over the sensor as pictures (PNG inside the page).
 
 
@@ -518,22 +493,8 @@ CLIP_SD = 5.0
 _WIDTH = 440
 """Width that pictures are enlarged to, at least [pixels]."""
 
-_ANCHORS = np.array(
-    [
-        (5, 48, 97),
-        (33, 102, 172),
-        (67, 147, 195),
-        (146, 197, 222),
-        (209, 229, 240),
-        (247, 247, 247),
-        (253, 219, 199),
-        (244, 165, 130),
-        (214, 96, 77),
-        (178, 24, 43),
-        (103, 0, 31),
-    ],
-    dtype=np.float64,
-)
+_RDBU = "053061 2166ac 4393c3 92c5de d1e5f0 f7f7f7 fddbc7 f4a582 d6604d b2182b 67001f"
+_ANCHORS = np.array([tuple(bytes.fromhex(colour)) for colour in _RDBU.split()], np.float64)
 """ColorBrewer's RdBu turned round: blue below zero, red above; safe for colour-blind readers."""
 _LEVELS = 129
 """Colours in all, an odd number: the middle one is zero."""
@@ -577,6 +538,5 @@ def image_of(picture: Picture, description: str) -> Markup:
 
 
 def colour_bar() -> Markup:
-    """Return the scale of the colours, as a picture."""
     scale = np.linspace(-CLIP_SD, CLIP_SD, _LEVELS)[None].repeat(6, axis=0)
     return map_image(scale, f"Colours from -{CLIP_SD:g} to +{CLIP_SD:g} standard deviations")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from adv2e.reports.charts import event_picture, top_of
+from adv2e.reports.charts import event_colours, image_of, top_of
 from adv2e.reports.markup import Column, Markup, table, tag
 from adv2e.reports.quantities import estimate_text, number_text
 from adv2e.reports.result import Diagnosis, Snapshot, Total
@@ -22,14 +22,14 @@ def events(diagnosis: Diagnosis) -> Markup:
 
 
 def _pictures(seen: Snapshot, names: Sequence[str]) -> Markup:
-    """Return the events of a short time side by side, in the same colours."""
     top, figures = top_of(seen), []
     for name, number in zip(names, (seen.measured, seen.before, seen.after), strict=False):
         off, on = (int(one.sum()) for one in number)
         told = f"{on + off:,} event{'s' * (on + off != 1)}"
         split = tag("span", f"{on:,} ON, {off:,} OFF", class_="meaning")
         caption = tag("figcaption", tag("span", name, class_="line"), told, split)
-        figures.append(tag("figure", caption, event_picture(number, top, f"{name}: {told}")))
+        picture = image_of(event_colours(number, top), f"{name}: {told}")
+        figures.append(tag("figure", caption, picture))
     first, last = seen.start_s, seen.start_s + seen.length_s
     title = f"Events of {1e3 * seen.length_s:.4g} ms: {first:.3f} to {last:.3f} s after the start"
     most = f", in full colour from {top} events of a pixel on" * (top > 1)
@@ -46,7 +46,6 @@ def _pictures(seen: Snapshot, names: Sequence[str]) -> Markup:
 
 
 def _totals(given: Sequence[Total], names: Sequence[str]) -> Markup:
-    """Return a table of totals over all events."""
     columns = [Column("all events"), *(Column(name, number=True) for name in names)]
     rows = []
     for one in given:

@@ -87,7 +87,6 @@ def record(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def record_text(diagnosis: Diagnosis) -> str:
-    """Return ``report.json`` as text."""
     return json.dumps(record(diagnosis), indent=2, allow_nan=False) + "\n"
 
 

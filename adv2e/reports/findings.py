@@ -98,17 +98,11 @@ def _meaning(diagnosis: Diagnosis) -> str:
 
 
 def other_errors(diagnosis: Diagnosis) -> Markup:
-    """Return the other measures of error."""
-    return join(
-        *(
-            tag(
-                "figure",
-                tag("figcaption", row.name),
-                error_chart(row, changed=bool(diagnosis.effects)),
-            )
-            for row in diagnosis.errors[1:]
-        )
-    )
+    figures = []
+    for row in diagnosis.errors[1:]:
+        chart = error_chart(row, changed=bool(diagnosis.effects))
+        figures.append(tag("figure", tag("figcaption", row.name), chart))
+    return join(*figures)
 
 
 def what_next(diagnosis: Diagnosis, folder: str | Path) -> Markup:
@@ -171,17 +165,12 @@ def nuisances(diagnosis: Diagnosis) -> Markup:
 
 
 def notes(texts: Sequence[str]) -> Markup:
-    """Return the list of notes for the reader."""
     return tag("ul", *(tag("li", text) for text in texts)) if texts else Markup()
 
 
 def facts(given: Mapping[str, str]) -> Markup:
-    """Return the small things."""
-    return (
-        tag("p", "; ".join(f"{what}: {value}" for what, value in given.items()))
-        if given
-        else Markup()
-    )
+    text = "; ".join(f"{what}: {value}" for what, value in given.items())
+    return tag("p", text) if given else Markup()
 
 
 # ---- Next steps after a diagnosis: use the model, check the recording, record more.
@@ -207,7 +196,9 @@ class Step:
 def next_steps(found: Diagnosis, folder: str | Path) -> list[Step]:
     """Return the next steps, the most useful first; `folder`: of the report."""
     if found.verdict == "unexplained":
-        return [*_checks(found), _own_effect(found)]
+        # mistakes are likelier than unknown effects
+        checks = [Step(f"First check the recording: {note}.") for note in found.input_checks[:1]]
+        return [*checks, _own_effect(found)]
     steps = [Step(_WHAT_FOR[found.verdict], convert_line(found, folder))]
     if found.verdict == "not_identifiable":
         steps.append(_separate(found))
@@ -223,11 +214,6 @@ def convert_line(found: Diagnosis, folder: str | Path) -> str:
     for name in own:
         line += f" --effect {shlex.quote(found.own.files.get(name, f'{name}.py'))}"
     return f"{line} VIDEO"
-
-
-def _checks(found: Diagnosis) -> list[Step]:
-    """Return the check of the recording to do first: mistakes are likelier than unknown effects."""
-    return [Step(f"First check the recording: {note}.") for note in found.input_checks[:1]]
 
 
 def _own_effect(found: Diagnosis) -> Step:

@@ -43,7 +43,6 @@ def tag(name: str, /, *content: object, **attributes: object) -> Markup:
 
     Parameters
     ----------
-    name : str
     *content : object
         Texts and elements, one after the other.
     **attributes : object
@@ -86,8 +85,6 @@ def table(
 
     Parameters
     ----------
-    caption : str
-    columns : sequence of Column
     rows : sequence of sequences
         Texts or markup, one for each column.
     folded_from : int
@@ -106,8 +103,7 @@ def table(
 
 def _one(caption: str, columns: Sequence[Column], rows: Sequence[Sequence[object]]) -> Markup:
     head = tag(
-        "tr",
-        *(tag("th", column.heading, scope="col", class_=_class(column)) for column in columns),
+        "tr", *(tag("th", column.heading, scope="col", class_=_class(column)) for column in columns)
     )
     body = [_row(columns, row) for row in rows]
     content = tag("table", tag("caption", caption), tag("thead", head), tag("tbody", *body))
@@ -269,7 +265,7 @@ _UNIT = re.compile("_(us|ns|hz|rad|dn|px|ppm|per_s)$")
 
 
 def heading_of(effect: str) -> str:
-    """Return the same as a heading, with the effect's name where that is another."""
+    """Return the label of an effect as a heading, with the effect's name where that differs."""
     label = label_of(effect)
     heading = f"{label[:1].upper()}{label[1:]}"
     return heading if label == effect.replace("_", " ") else f"{heading} ({effect})"

@@ -33,14 +33,15 @@ def page(diagnosis: Diagnosis, folder: str | Path = ".") -> str:
         "Values that were not declared and were fitted": findings.nuisances(found),
         "Notes": findings.notes(found.notes),
     }
+    # those for paper are unfolded before printing
     folded = {
-        "Pixels with too many or too few events": (residual.maps(found.maps), True),
-        "Effects that were tried and not added": (residual.rejected(found), True),
-        "Which data were used": (residual.data(found), True),
-        "Other measures of the error": (findings.other_errors(found), False),
-        "All numbers that were compared": (residual.signatures(found.signatures), False),
-        "How large an effect must be to be seen": (residual.detectable(found.detectable), False),
-        "Sizes, seeds, times and versions": (findings.facts(found.facts), True),
+        "Pixels with too many or too few events": (residual.maps(found.maps), "paper"),
+        "Effects that were tried and not added": (residual.rejected(found), "paper"),
+        "Which data were used": (residual.data(found), "paper"),
+        "Other measures of the error": (findings.other_errors(found), "screen"),
+        "All numbers that were compared": (residual.signatures(found.signatures), "screen"),
+        "How large an effect must be to be seen": (residual.detectable(found.detectable), "screen"),
+        "Sizes, seeds, times and versions": (findings.facts(found.facts), "paper"),
     }
     title = f"{found.wording.title} {found.recording}"
     head = tag(
@@ -65,19 +66,13 @@ def page(diagnosis: Diagnosis, folder: str | Path = ".") -> str:
             if content
         ),
         *(
-            _folded(heading, content, on_paper=on_paper)
-            for heading, (content, on_paper) in folded.items()
+            tag("details", tag("summary", tag("h2", heading)), content, class_=medium)
+            for heading, (content, medium) in folded.items()
             if content
         ),
     )
     document = tag("html", head, tag("body", main, tag("script", Markup(_UNFOLD))), lang="en")
     return f"<!DOCTYPE html>\n{document}\n"
-
-
-def _folded(heading: str, content: Markup, *, on_paper: bool) -> Markup:
-    """Return a section that opens when its heading is clicked."""
-    summary = tag("summary", tag("h2", heading))
-    return tag("details", summary, content, class_="paper" if on_paper else "screen")
 
 
 # ---- The looks of the page: light and dark, on screen and on paper.

@@ -137,7 +137,6 @@ def estimate_text(estimate: Estimate) -> str:
 
 
 def percent_text(share: float) -> str:
-    """Return a share as a percentage."""
     return NOTHING if math.isnan(share) else f"{short_text(100 * share, 2)} %"
 
 
@@ -149,7 +148,6 @@ def probability_text(p: float) -> str:
 
 
 def unit_text(unit: str) -> str:
-    """Return a unit as people write it."""
     return {"us": "µs", "-": ""}.get(unit, unit)
 
 

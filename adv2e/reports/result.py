@@ -29,7 +29,6 @@ class Finding:
 
     Attributes
     ----------
-    name : str
     parameters : mapping
         Fitted value of each key, by its path in the configuration.
     interval : mapping
@@ -62,6 +61,12 @@ class Estimate:
     value: float
     interval: Interval | None = None
 
+    @classmethod
+    def of_draws(cls, values: Sequence[float] | NDArray[np.float64]) -> Estimate:
+        """Return the mean of draws, and the range of their middle 95 %."""
+        low, high = np.quantile(values, [0.025, 0.975])
+        return cls(float(np.mean(values)), (float(low), float(high)))
+
 
 ROLES = ("before", "after", "floor")
 """Of the numbers of an error: declared model, model found, draws of that against each other."""
@@ -75,7 +80,6 @@ class ErrorRow:
     ----------
     name : str
         What it measures, in a few words.
-    before, after, floor : Estimate
     without_chance : bool
         Of the mean of simulations: what chance makes in each of them does not count.
     """
@@ -93,7 +97,6 @@ class Signature:
 
     Attributes
     ----------
-    name : str
     group : str
         What it belongs to, such as "time between events".
     meaning : str
@@ -104,7 +107,6 @@ class Signature:
         Distance of the recording from the simulations in their standard deviations.
     unit : str
         Of the values; of a share or a ratio: of what to what.
-    kind : str
     """
 
     name: str
@@ -170,7 +172,6 @@ class Curve:
         Places of the points, or, one more than values, borders of bins.
     measured : (n,)
         NaN where there is nothing to measure.
-    before, after : Band
     x_log, y_log : bool
         Logarithmic axes.
     x_names : sequence of str
@@ -222,7 +223,6 @@ class Diagnosis:
 
     Attributes
     ----------
-    verdict : str
     remark : str
         What the verdict says besides :attr:`sentence`.
     recording, declared : str
@@ -233,20 +233,15 @@ class Diagnosis:
         Effects that fit the data as well.
     nuisances : mapping
         Keys that were not declared, with their fitted values.
-    rejected : list of Rejected
     errors : list of ErrorRow
         The first is the one that ``report.json`` gives.
     global_p_before, global_p_after : float
         Probability of a residual as large if nothing were missing, in all data that are compared:
         below 0.01 something is left.
-    signatures : list of Signature
-    totals : sequence of Total
     snapshot : Snapshot, optional
         None where there are no events to show, as of tables.
     curves, maps
         The picture of the residual.
-    detectable : list of Detectable
-    masked : list of Masked
     split : str
         How the data were divided into those for training, validation and test.
     notes : list of str

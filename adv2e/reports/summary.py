@@ -6,12 +6,7 @@ import textwrap
 
 from adv2e.reports.headline import compared_text, declared_text, of_each_kind
 from adv2e.reports.markup import plain, unit_of
-from adv2e.reports.quantities import (
-    interval_text,
-    number_text,
-    probability_text,
-    value_text,
-)
+from adv2e.reports.quantities import interval_text, number_text, probability_text, value_text
 from adv2e.reports.residual import by_explained
 from adv2e.reports.result import Diagnosis, ErrorRow
 

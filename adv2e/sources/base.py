@@ -269,8 +269,6 @@ class GivenTimes:
 
     Parameters
     ----------
-    fps : float, Fraction or str, optional
-    timestamps : Path, optional
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         Unit of the times in lists.
 
@@ -293,7 +291,6 @@ class GivenTimes:
 
     @classmethod
     def of(cls, options: FrameInput) -> GivenTimes:
-        """Return what options say."""
         listed = options["timestamps"]
         return cls(options["fps"], Path(listed) if listed else None, options["time_unit"])
 
@@ -346,7 +343,6 @@ class Selection:
 
     @classmethod
     def of(cls, options: SourceOptions | EventInput) -> Selection:
-        """Return what options say."""
         given: dict[str, Any] = {item.name: options.get(item.name) for item in fields(cls)}
         track = options["track"]
         return cls(

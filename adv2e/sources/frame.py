@@ -198,7 +198,6 @@ class Track:
 
     @property
     def parts(self) -> list[str]:
-        """The parts of its name."""
         return self.name.strip("/").split("/")
 
     def is_called(self, name: str) -> bool:
@@ -228,7 +227,6 @@ def choose(
     ----------
     wanted : str, optional
         Number or name of a track that the user gives.
-    events, frames : sequences of Track
     path : path
         The file, for messages.
 

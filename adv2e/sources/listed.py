@@ -49,10 +49,8 @@ def timed(
 
     Parameters
     ----------
-    given : GivenTimes
     pictures : sequence of Picture
         All of `path`, in order.
-    path : Path
     found : str or None
         Name of the list that was found.
     read_found : callable, optional

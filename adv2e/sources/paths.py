@@ -91,7 +91,6 @@ class SensorPath:
 
     @classmethod
     def of(cls, options: SourceOptions) -> SensorPath | None:
-        """Return the path that options say, if they do."""
         kind = options["motion"]
         if kind is None:
             return None
@@ -104,7 +103,6 @@ class SensorPath:
 
     @property
     def duration(self) -> float:
-        """Duration of the path [s]."""
         return PATHS[self.kind][2] if self.duration_s is None else self.duration_s
 
     @property

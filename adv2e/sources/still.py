@@ -73,7 +73,6 @@ class StillSource(Source):
         self.notes.append(f"the sensor moves: {along}, in {count:,} frames")
 
     def shots(self) -> Iterator[Shot]:
-        """Yield every frame."""
         for number in range(self.count or 0):
             t_ns = self._rate.time_ns(number)
             offset = self._along.at(min(1.0, t_ns / self._end_ns))

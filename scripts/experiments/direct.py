@@ -28,8 +28,8 @@ import click
 import numpy as np
 from writing import as_written, output_option, table, write_report
 
+from adv2e.comparison.compare import Floor, half_split
 from adv2e.comparison.distances import MEASURES, distances
-from adv2e.comparison.floor import Floor, half_split
 from adv2e.comparison.windows import Windows
 from adv2e.diagnosis.fitting.fitter import TOLERANCE
 from adv2e.events import Events, empty_events

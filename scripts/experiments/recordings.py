@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.comparison.compare import Floor
 from adv2e.comparison.distances import distances, pooled
-from adv2e.comparison.floor import Floor
 from adv2e.comparison.windows import Windows, frame_windows, span_of, to_us
 from adv2e.diagnosis.fitting.fitter import TOLERANCE, match_totals
 from adv2e.effects.frames.encoding import LightDecoder

@@ -20,7 +20,6 @@ from adv2e.diagnosis import recordings as whole
 from adv2e.diagnosis.fitting.library import names
 from adv2e.diagnosis.outcome import verdict
 from adv2e.diagnosis.selection import reference, shortlist
-from adv2e.diagnosis.simulation.simulator import Progress
 from adv2e.formats.writing import open_sink
 from adv2e.geometry import Rectangle
 from adv2e.reports import summary
@@ -296,7 +295,7 @@ def made_up(monkeypatch, tmp_path):
         log("a step")
         steps = ("simulating", 0), ("simulating", 3), ("searching", 3), ("judging", 10)
         for step in steps:
-            progress(Progress(*step))
+            progress(*step)
 
     monkeypatch.setattr(whole, "read_evidence", read)
     monkeypatch.setattr(whole, "part_of", part)

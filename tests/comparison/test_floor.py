@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from adv2e.comparison.compare import half_split
 from adv2e.comparison.distances import distances
-from adv2e.comparison.floor import half_split
 from adv2e.comparison.windows import Windows
 from adv2e.events import make_events, sort_events
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from adv2e.comparison.floor import half_split
+from adv2e.comparison.compare import half_split
 from adv2e.comparison.windows import Windows, frame_windows, span_of
 from adv2e.formats.reading import read_events
 

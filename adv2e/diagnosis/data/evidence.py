@@ -48,18 +48,14 @@ class Evidence:
 
     Attributes
     ----------
-    name : str
     frames : sequence of (rows, columns[, 3]) arrays
         As stored; of known light, evenly spaced instants of it.
     times_s : (frames,)
         Their stamps [s].
     stream : Stream
         Events between the first frame and the last.
-    width, height : int
     encoding : str
         What ``frames.encoding: auto`` means for the frames.
-    masked : list of Masked
-    notes : list of str
     run_in : RunIn
         What pixels saw before; events of that time are of no recording and no simulation.
     white : float, optional
@@ -83,12 +79,10 @@ class Evidence:
 
     @property
     def times_ns(self) -> list[int]:
-        """Stamps of the frames [ns]."""
         return [round(t * 1e9) for t in self.times_s.tolist()]
 
     @property
     def seconds(self) -> float:
-        """Length of the recording [s]."""
         return float(self.times_s[-1] - self.times_s[0])
 
     @property
@@ -161,7 +155,6 @@ class Evidence:
         return replace(part, stimulus=seen, frames=of_part(self.frames), run_in=before)
 
     def with_frames(self, changed: Callable[[NDArray[Any]], NDArray[Any]]) -> Evidence:
-        """Return the recording with all frames changed, those of the run-in as well."""
         before = replace(self.run_in, frames=[changed(one) for one in self.run_in.frames])
         return replace(self, frames=[changed(one) for one in self.frames], run_in=before)
 

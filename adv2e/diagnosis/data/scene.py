@@ -40,8 +40,6 @@ class Scene:
         Thirds of what moves.
     speed_borders, brightness_borders : (2,)
         Between the thirds, [ln/s] and [DN].
-    split : Split
-    width, height : int
     leaps : Leaps, optional
         Of known light; None: what there is are frames.
     """
@@ -102,17 +100,14 @@ class Scene:
 
     @property
     def intervals(self) -> int:
-        """Number of frame intervals."""
         return len(self.slope)
 
     @cached_property
     def seconds(self) -> NDArray[np.float64]:
-        """Length of each frame interval [s]."""
         return np.diff(self.times_us) * 1e-6
 
     @property
     def pixels(self) -> int:
-        """Number of pixels."""
         return self.width * self.height
 
     def interval_of(self, t_us: NDArray[np.int64], late_us: float = 0.0) -> NDArray[np.int64]:
@@ -178,7 +173,6 @@ class Placed:
 
     @classmethod
     def of(cls, stream: Stream, scene: Scene) -> Placed:
-        """Find the events of `stream` in `scene`."""
         interval = scene.interval_of(stream.t)
         segment = scene.split.segment_of(stream.t)
         pixel = stream.pixel

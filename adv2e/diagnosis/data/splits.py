@@ -41,7 +41,6 @@ class Split:
 
     @classmethod
     def of(cls, width: int, height: int, start_us: float, stop_us: float) -> Split:
-        """Return the division of a recording."""
         size = max(1, min(_TILE, width // 4, height // 4))
         y, x = np.mgrid[:height, :width] // size
         segment = np.arange(_SEGMENTS)[:, None, None]
@@ -51,11 +50,9 @@ class Split:
 
     @property
     def segments(self) -> int:
-        """Number of segments of time."""
         return len(self.label)
 
     def segment_of(self, t: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the segment of each of sorted times [us]."""
         inner = np.searchsorted(t, self.borders_us[1:-1])  # sorted: few searches, not many
         return np.repeat(np.arange(self.segments), np.diff(np.r_[0, inner, len(t)]))
 
@@ -65,11 +62,9 @@ class Split:
         return stream.chosen(np.isin(label, parts))
 
     def share(self, part: int) -> float:
-        """Return the share of pixels and time that a part has."""
         return float(np.mean(self.label == part))
 
     def text(self) -> str:
-        """Return a sentence about the split, with the share of each part."""
         shares = ", ".join(f"{name} {self.share(k):.0%}" for k, name in enumerate(NAMES))
         return (
             f"the sensor was divided into tiles and the time into {self.segments} segments, shared"
@@ -92,7 +87,6 @@ class Stream:
         Row times columns plus column.
     on : (n,) int8
         1: ON, 0: OFF.
-    width, height : int
     """
 
     t: NDArray[np.int64]
@@ -118,7 +112,6 @@ class Stream:
         return len(self.t)
 
     def between(self, start_us: float, stop_us: float) -> Stream:
-        """Return the events of a span of time."""
         return self.chosen(slice(*np.searchsorted(self.t, [start_us, stop_us])))
 
     def chosen(self, which: Any) -> Stream:
@@ -126,7 +119,6 @@ class Stream:
         return Stream(self.t[which], self.pixel[which], self.on[which], self.width, self.height)
 
     def events(self) -> Events:
-        """Return the events in the package's own form."""
         events = np.empty(len(self), EVENT_DTYPE)
         events["t"], events["p"] = self.t, self.on
         events["y"], events["x"] = np.divmod(self.pixel, self.width)
@@ -134,7 +126,6 @@ class Stream:
 
     @cached_property
     def by_pixel(self) -> NDArray[np.int64]:
-        """Order by pixel, and by time in each."""
         # radix sort for 16-bit numbers
         small = self.width * self.height <= 1 << 16
         return np.argsort(self.pixel.astype(np.uint16) if small else self.pixel, kind="stable")

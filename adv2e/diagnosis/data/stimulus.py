@@ -63,7 +63,6 @@ class Stimulus:
         return np.stack(columns, axis=1)
 
     def cut(self, rows: slice, columns: slice) -> Stimulus:
-        """Return the stimulus of a rectangle of pixels."""
         return replace(self, region=self.region[rows, columns])
 
     def between(self, start_ns: int, stop_ns: int) -> Stimulus:
@@ -79,7 +78,6 @@ class Stimulus:
 
     @cached_property
     def leaps(self) -> Leaps:
-        """Times at which the light of each pixel leaps [us]."""
         each = [_leaps_us(self.times_ns, one) for one in self.light.T]
         return Leaps(tuple(each), self.region.ravel())
 
@@ -139,7 +137,6 @@ def _between(
 
 
 def _leaps_us(times_ns: NDArray[np.int64], course: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the times [us] at which a course leaps."""
     change = np.abs(np.diff(np.log(np.maximum(course, _DARK_DN))))
     quick = (change > _LEAST_LN) & (np.diff(times_ns) <= _QUICK_NS)
     found: list[int] = []
@@ -195,7 +192,6 @@ class Seen(Sequence[NDArray[Any]]):
 
 
 def joined(before: Sequence[NDArray[Any]], after: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
-    """Return two sequences of frames, one after the other."""
     if isinstance(before, Seen) and isinstance(after, Seen):
         return Seen(np.concatenate([before.light, after.light]), after.region)
     return [*before, *after]

@@ -25,7 +25,6 @@ class FitParameter:
 
     Attributes
     ----------
-    key : str
     low, high : float
         Physical range.
     log : bool
@@ -53,7 +52,6 @@ class FitParameter:
     of_pixels: bool = False
 
     def scaled(self, value: float) -> float:
-        """Return `value` on the fitted scale."""
         return math.log(value) if self.log else value / self.scale
 
     def value_at(self, scaled: float) -> float:
@@ -62,13 +60,11 @@ class FitParameter:
         return float(min(max(value, self.low), self.high))
 
     def at_border(self, scaled: float) -> bool:
-        """Tell whether the fit has run to the end of the physical range."""
         value = self.value_at(scaled)
         low, high = 1e-9 * abs(self.low), 1e-9 * abs(self.high)
         return value <= self.low + low or value >= self.high - high
 
     def set(self, values: dict[str, Any], value: float) -> None:
-        """Set the key in nested mappings."""
         held: Any = value
         if self.text:
             held = self.text.format(f"{value:.6g}")
@@ -93,8 +89,6 @@ class Candidate:
 
     Attributes
     ----------
-    name : str
-    parameters : tuple of FitParameter
     starts : tuple of tuple of float
         Values from which the fit may start.
     extra : tuple of (str, value)
@@ -136,7 +130,7 @@ class Candidate:
 
     @classmethod
     def joined(cls, each: Sequence[Candidate]) -> Candidate:
-        """Return one of all parameters; it starts at their first starts, their second ones, ..."""
+        """Return one candidate of all parameters; its k-th start joins the k-th start of each."""
         count = max((len(one.starts) for one in each), default=0)
         starts = [
             [value for one in each for value in one.starts[min(k, len(one.starts) - 1)]]
@@ -158,11 +152,9 @@ class Candidate:
         return self.known or (NOTHING_KNOWN,) * len(self.parameters)
 
     def scaled(self, values: Sequence[float]) -> list[float]:
-        """Return values of the parameters on their fitted scales."""
         return [one.scaled(value) for one, value in zip(self.parameters, values, strict=True)]
 
     def applied(self, config: Config, point: Point) -> Config:
-        """Return `config` with this effect."""
         values = to_dict(config)
         for key, value in self.defaults:
             if get_key(values, key.rpartition(".")[0]) is None:
@@ -171,11 +163,10 @@ class Candidate:
         return applied if self.pulse is None else self.pulse.placed(applied)
 
     def settings(self, point: Point) -> dict[str, Any]:
-        """Return the keys that this effect sets, and their values."""
         return dict(flat(self._set({}, point)))
 
     def settings_in(self, config: Config, point: Point) -> dict[str, Any]:
-        """Return the same of a model that has it: what was set besides, as it is there.
+        """Return the keys of this effect in a model with it; those not fitted, as they are there.
 
         Where a pulse is, others' keys tell, too.
         """

@@ -24,7 +24,6 @@ class Fitted:
 
     Attributes
     ----------
-    candidate : Candidate
     base : Config
         The model that the candidate is added to.
     point : (parameters,)
@@ -40,7 +39,6 @@ class Fitted:
         to be, until :meth:`Fitter.set_covariance` is called.
     reach : float
         Over which the next derivative is taken.
-    damping : float
     moved : float
         By the last step, at most, in deviations of the point.
     simulations : int
@@ -68,11 +66,9 @@ class Fitted:
 
     @property
     def config(self) -> Config:
-        """The model with the effect as fitted."""
         return self.at_point(self.point)
 
     def at_point(self, point: Array) -> Config:
-        """Return the model with the effect at another point."""
         return self.candidate.applied(self.base, point)
 
     @property
@@ -81,7 +77,6 @@ class Fitted:
         return self.candidate.settings_in(self.config, self.point)
 
     def inside(self, point: Array) -> Array:
-        """Return `point` within the physical ranges."""
         parameters = self.candidate.parameters
         return np.array(
             [one.scaled(one.value_at(at)) for one, at in zip(parameters, point, strict=True)]
@@ -107,7 +102,6 @@ class Fitted:
 
     @property
     def at_border(self) -> bool:
-        """True if a fitted parameter is at the end of its physical range."""
         pairs = zip(self.candidate.parameters, self.point, strict=True)
         return any(one.at_border(at) for one, at in pairs)
 
@@ -152,13 +146,11 @@ class Axes:
 
     @classmethod
     def of(cls, normal: NDArray[Any]) -> Axes:
-        """Return the axes of a normal matrix."""
         squares, columns = np.linalg.eigh(normal)
         deviation = 1.0 / np.sqrt(np.maximum(squares, 1e-12))
         return cls(columns.T, deviation, np.clip(_REACH * deviation, *_REACHES))
 
     def along(self, move: Array) -> Array:
-        """Return the parts of a move along each direction."""
         return np.asarray(self.directions @ move)
 
 

@@ -60,12 +60,7 @@ class Fitter:
     """
 
     def __init__(
-        self,
-        sampler: Sampler,
-        scale: Scale,
-        observed: Array,
-        view: int,
-        sd: Array | None = None,
+        self, sampler: Sampler, scale: Scale, observed: Array, view: int, sd: Array | None = None
     ) -> None:
         self._sampler, self.scale, self._view = sampler, scale, view
         self._whitening = scale.whitening if sd is None else scale.whitening / sd
@@ -83,7 +78,6 @@ class Fitter:
     def at_best_starts(
         self, candidates: Sequence[Candidate], base: Config, seeds: Sequence[int]
     ) -> list[Fitted]:
-        """Return each candidate at the best of its starts."""
         fits = [
             Fitted.at(start, candidate, base)
             for candidate in candidates
@@ -97,7 +91,6 @@ class Fitter:
         ]
 
     def misfit(self, config: Config, seeds: Sequence[int]) -> float:
-        """Return the sum of squares of a model as it is."""
         return self._square(self.whites([config], seeds)[0])
 
     def _square(self, mean: Array) -> float:
@@ -252,8 +245,8 @@ def _damped(fit: Fitted, slope: Slope) -> Array:
 
 
 TOLERANCE = 0.01
-"""Totals match to this, relative."""
-ROUNDS = 15
+"""Totals match to this, relative: the search ends there."""
+_ROUNDS = 15
 """Simulations at most."""
 LARGEST = 5.0
 """Largest threshold tried [ln]; grey levels of 8 bits span 5.5."""
@@ -261,7 +254,6 @@ _SIGNS = ("on", "off")
 
 
 def thresholds_of(config: Config) -> dict[str, float]:
-    """Return the thresholds of a configuration, by key."""
     return {f"pixel.thresholds.{sign}": getattr(config.pixel.thresholds, sign) for sign in _SIGNS}
 
 
@@ -276,9 +268,6 @@ def fit_thresholds(
     simulate: Callable[[Config], tuple[int, int]],
     declared: Config,
     measured: tuple[int, int],
-    *,
-    tolerance: float = TOLERANCE,
-    rounds: int = ROUNDS,
 ) -> tuple[Config, float]:
     """Return the declared model with thresholds that match the totals, and what they miss by.
 
@@ -287,20 +276,15 @@ def fit_thresholds(
     simulate : callable
         Returns the counts of ON and OFF events of a simulation, over the same pixels and times as
         those measured.
-    declared : Config
     measured : (int, int)
         Counts wanted.
-    tolerance : float
-        The search ends where both totals are this near, relative.
-    rounds : int
-        Simulations at most.
 
     Returns
     -------
     config : Config
         With the best thresholds met.
     miss : float
-        By how much the worse of the two totals misses, relative; above `tolerance` where no
+        By how much the worse of the two totals misses, relative; above :data:`TOLERANCE` where no
         thresholds match.
     """
     pixel = declared.pixel
@@ -311,9 +295,10 @@ def fit_thresholds(
 
     levels, miss = match_totals(
         lambda on, off: simulate(with_levels(on, off)),
-        (pixel.thresholds.on, pixel.thresholds.off), measured,
-        within=(FLOOR, LARGEST), tolerance=tolerance, rounds=rounds,
-    )  # fmt: skip
+        (pixel.thresholds.on, pixel.thresholds.off),
+        measured,
+        within=(FLOOR, LARGEST),
+    )
     return with_levels(*levels), miss
 
 
@@ -323,8 +308,6 @@ def match_totals(
     measured: tuple[int, int],
     *,
     within: tuple[float, float],
-    tolerance: float = TOLERANCE,
-    rounds: int = ROUNDS,
 ) -> tuple[tuple[float, float], float]:
     """Return the pair of thresholds that matches the totals, and what it misses by.
 
@@ -340,18 +323,16 @@ def match_totals(
         Counts wanted.
     within : (float, float)
         Smallest and largest threshold tried.
-    tolerance, rounds
-        See :func:`fit_thresholds`.
     """
     wanted = np.log(np.maximum(measured, 0.5))
     levels, slope = np.log(start), np.full(2, -1.0)
     best = np.inf, levels
     before: tuple[NDArray[Any], NDArray[Any]] | None = None
-    for _ in range(rounds):
+    for _ in range(_ROUNDS):
         miss = np.log(np.maximum(simulate(*np.exp(levels).tolist()), 0.5)) - wanted
         if np.abs(miss).max() < best[0]:
             best = float(np.abs(miss).max()), levels
-        if best[0] <= np.log1p(tolerance):
+        if best[0] <= np.log1p(TOLERANCE):
             break
         if before is not None:
             moved, gained = levels - before[0], miss - before[1]

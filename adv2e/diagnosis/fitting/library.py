@@ -90,7 +90,6 @@ def _built_in(declared: Config, hints: Hints) -> Iterator[Candidate]:
 
 
 def _fit_of(key: str) -> Fit:
-    """Return the range, scale and start of the fit of a key, as declared."""
     fit = BUILT_IN[key].fit
     assert fit is not None, key
     return fit
@@ -119,7 +118,6 @@ def _now(values: dict[str, Any], key: str) -> float:
 
 
 def _multiples(key: str, value: float) -> list[float]:
-    """Return where the fit of a key begins that is declared with a value."""
     return [factor * value for factor in _fit_of(key).factors]
 
 

@@ -92,7 +92,7 @@ def hints_of(
             too_many=too_many,
             shortest_us=float(np.quantile(apart, _HARDLY_ANY)) if len(apart) else None,
         )
-    looked_at = looked_at_by(evidence, scene)
+    looked_at = train_and_validation_events(evidence, scene)
     lines = strongest_lines(train(stream), list(map(train, pilot)), scene)
     lamps = lamps_of(
         lines, train(stream), declared, lambda lit: train(simulator.stream(lit, _LAMP_SEED))
@@ -110,7 +110,7 @@ def hints_of(
     )
 
 
-def looked_at_by(evidence: Evidence, scene: Scene) -> Stream:
+def train_and_validation_events(evidence: Evidence, scene: Scene) -> Stream:
     """Return the events for training and validation, off which the frame readout is read."""
     return scene.split.chosen(evidence.stream, splits.TRAIN, splits.VALIDATION)
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.data.splits import Stream
-from adv2e.diagnosis.hints.readouts import DELAY, RISE, WIDTH, Burst, burst_of, folded
+from adv2e.diagnosis.hints.readouts import DELAY, RISE, Burst, burst_of, folded
 from adv2e.diagnosis.hints.stamps import tick_of
 
 Array = NDArray[np.float64]
@@ -99,13 +99,10 @@ class OwnPeriod:
         first, second = (self.on, self.off) if up else (self.off, self.on)
         if first is None or second is None or first is not self.first:
             return None
-        width = (second.begins_us - first.begins_us) % self.period_us
-        rise = min(first.lasts_us, second.lasts_us)  # events of the other may have waited
-        return {PERIOD: self.period_us, DELAY: first.begins_us, WIDTH: width, RISE: rise}
+        return {PERIOD: self.period_us, **first.until(second, self.period_us)}
 
     @property
     def read_off(self) -> tuple[tuple[str, float], ...]:
-        """Standard deviations of the keys."""
         return (PERIOD, self.period_sd_us), (DELAY, self.begin_sd_us)
 
     def text(self) -> str:
@@ -213,7 +210,6 @@ def _likeliest(height: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def _highest(height: Array) -> list[int]:
-    """Return the bins of the highest bursts, of each the highest."""
     left, found = height.copy(), []
     for _ in range(_HIGHEST):
         top = int(np.argmax(left))

@@ -81,7 +81,6 @@ class Readouts:
 
     @property
     def exposure_sd_us(self) -> float:
-        """Standard deviation of the exposures that end there."""
         return _SD_BINS * self.interval_us / _BINS
 
     def exposed(self, config: Config) -> Config:
@@ -122,7 +121,6 @@ class Burst:
     ----------
     begins_us : float
         After the time of each frame, or whole intervals later or earlier.
-    lasts_us : float
     share : float
         Of the polarity's events that are in such bursts.
     """
@@ -130,6 +128,13 @@ class Burst:
     begins_us: float
     lasts_us: float
     share: float
+
+    def until(self, second: Burst, interval_us: float) -> dict[str, float]:
+        """Return the keys of a pulse from this leap to that back, which come every interval."""
+        # the shorter one: the other's events may have waited to be due
+        rise = min(self.lasts_us, second.lasts_us)
+        width = (second.begins_us - self.begins_us) % interval_us
+        return {DELAY: self.begins_us, WIDTH: width, RISE: rise}
 
 
 @dataclass(frozen=True)
@@ -161,10 +166,7 @@ class Pulse:
         With the leap as long after the stamps; see :meth:`placed`.
         """
         first, second = (self.on, self.off) if up else (self.off, self.on)
-        width = (second.begins_us - first.begins_us) % self.interval_us
-        # the shorter one: the other's events may have waited to be due
-        rise = min(first.lasts_us, second.lasts_us)
-        found = {DELAY: self._nearest(first.begins_us), WIDTH: width, RISE: rise}
+        found = {**first.until(second, self.interval_us), DELAY: self._nearest(first.begins_us)}
         return {**found, DRIFT: self.drift_ppm} if self.drift_ppm else found
 
     def placed(self, config: Config) -> Config:

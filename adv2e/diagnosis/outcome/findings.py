@@ -110,22 +110,10 @@ def signatures_of(reference: Reference, declared: State, kept: State) -> list[Si
     z = [one.z(observed) for one in of_models]
     signatures = []
     for k, entry in enumerate(statistics.entries):
-        measured, before, after = (entry.plain(float(values[k])) for values in (observed, *means))
-        z_before, z_after = (float(deviations[k]) for deviations in z)
-        signatures.append(
-            Signature(
-                entry.name,
-                statistics.titles[k],
-                entry.meaning,
-                measured,
-                before,
-                after,
-                z_before,
-                z_after,
-                entry.unit,
-                statistics.kinds[k],
-            )
-        )
+        about = entry.name, statistics.titles[k], entry.meaning
+        measured, before, after = (entry.plain(float(row[k])) for row in (observed, *means))
+        values = measured, before, after, float(z[0][k]), float(z[1][k])
+        signatures.append(Signature(*about, *values, entry.unit, statistics.kinds[k]))
     return signatures
 
 
@@ -145,8 +133,7 @@ def about_frames(prepared: Prepared) -> list[str]:
     else:
         doubt = prepared.between_frames.doubt(chance, BOTH)
         made_up = "the light between the frames, which is interpolated,"
-        text = _uncertain(made_up, doubt, "frames left out")
-        notes.append(text)
+        notes.append(_uncertain(made_up, doubt, "frames left out"))
     if prepared.between_levels is not None:
         doubt = prepared.between_levels.doubt(chance, BOTH)
         untold = "the light between two levels of the frames' numbers"

@@ -75,23 +75,10 @@ def curves_of(
     """
     drawn = []
     for kind in (*_between_events(), *_by_place(scene), *_by_time(scene, before)):
-        values = kind.measure(measured)
-        first, second = (
-            _band([kind.measure(one) for one in simulated]) for simulated in (before, after)
-        )
-        drawn.append(
-            Curve(
-                kind.title,
-                kind.x_label,
-                kind.y_label,
-                kind.x,
-                values,
-                first,
-                second,
-                kind.x_log,
-                x_names=kind.x_names,
-            )
-        )
+        axes = kind.title, kind.x_label, kind.y_label, kind.x
+        first, second = (_band([kind.measure(one) for one in some]) for some in (before, after))
+        values = kind.measure(measured), first, second
+        drawn.append(Curve(*axes, *values, kind.x_log, x_names=kind.x_names))
     return drawn
 
 
@@ -110,9 +97,7 @@ def maps_of(
 
     return [
         ResidualMap(
-            f"{name} events: measured minus simulated",
-            excess_of(on, before),
-            excess_of(on, after),
+            f"{name} events: measured minus simulated", excess_of(on, before), excess_of(on, after)
         )
         for name, on in _POLARITIES
     ]
@@ -150,7 +135,7 @@ def totals_of(
             name,
             unit,
             number(measured),
-            *(_mean([number(one) for one in placed]) for placed in (before, after)),
+            *(Estimate.of_draws([number(one) for one in placed]) for placed in (before, after)),
         )
         for name, unit, number in kinds
     ]
@@ -190,18 +175,12 @@ def snapshot_of(
     return Snapshot((first - start) * 1e-6, length * 1e-6, *map(number_of, shown))
 
 
-def _mean(values: Sequence[float]) -> Estimate:
-    low, high = np.quantile(values, [0.025, 0.975])
-    return Estimate(float(np.mean(values)), (float(low), float(high)))
-
-
 def _band(rows: Sequence[Array]) -> Band:
     low, middle, high = np.quantile(np.array(rows), [0.025, 0.5, 0.975], axis=0)
     return Band(middle, low, high)
 
 
 def _between_events() -> Iterator[_Axes]:
-    """Yield the times between events of a pixel, and of the whole sensor."""
     for kind, same in (("same", True), ("other", False)):
         title, label = f"a pixel, {kind} polarity", "the event before [ms]"
         yield _times(title, label, _GAPS_MS, _gaps(same))
@@ -242,7 +221,7 @@ def _by_place(scene: Scene) -> Iterator[_Axes]:
         np.array(LAGS_MS),
         _lags(scene),
     )
-    borders = row_borders(scene)
+    borders = np.rint(np.linspace(0.0, scene.height, min(scene.height, _MOST_ROWS) + 1))
     row = np.searchsorted(borders, np.arange(scene.pixels) // scene.width, "right") - 1
     rows = _rates(scene, row[None], len(borders) - 1)
     yield _Axes("Rate against row", "row, from the top [pixels]", _PER_PIXEL, borders, rows)
@@ -278,11 +257,6 @@ def _by_time(scene: Scene, before: Sequence[Placed]) -> Iterator[_Axes]:
         borders_s,
         _course(scene, borders_s),
     )
-
-
-def row_borders(scene: Scene) -> Array:
-    """Return the rows at which classes of rows begin, and the end."""
-    return np.rint(np.linspace(0.0, scene.height, min(scene.height, _MOST_ROWS) + 1))
 
 
 def contrast(scene: Scene) -> NDArray[np.float32]:

@@ -71,7 +71,7 @@ def verdict_of(outcome: Outcome, error: ErrorRow, interpolated: float = 0.0) -> 
 
 
 def _gone(error: ErrorRow, interpolated: float) -> tuple[float, float]:
-    """Return by how much of what it can the error fell, and by how much at most (97.5 %).
+    """Return the fall of the error as a share of the largest possible, and its bound (97.5 %).
 
     One where the error tells nothing of the effect.  Statistics fall for any effect that does some
     of what is missing; events come where they are measured only for those that do it where and when
@@ -167,7 +167,6 @@ class Conclusion:
 
 
 def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion:
-    """Look at the test data, and decide."""
     scene, simulator = prepared.scene, prepared.reference.sampler.simulator
     simulator.begin("judging on data not used so far")
 
@@ -307,7 +306,7 @@ class _Size:
 
 
 def _missing(ensemble: Ensemble, recording: NDArray[np.float64]) -> float:
-    """Return by which factor an effect must be larger to be seen in a recording with it."""
+    """Return the factor by which an effect must grow to be detected in a recording with it."""
     misfit_limit, largest_limit = ensemble.limits(PER_LOOK)
     # squares add up, single deviations grow in proportion
     misfit = (ensemble.misfit(recording) - ensemble.floor) / (misfit_limit - ensemble.floor)
@@ -341,7 +340,6 @@ class Errors:
 
     @classmethod
     def of(cls, measured: Stream, simulations: Sequence[Stream]) -> Errors:
-        """Return the errors of simulations; NaN if nothing was measured."""
         unit = _norm(measured)
         return cls(
             np.array([_apart(measured, stream, unit) for stream in simulations]),
@@ -364,7 +362,7 @@ def error_rows(before: Errors, after: Errors) -> list[ErrorRow]:
     """
     names = [NAME, *(f"{NAME} over {sigma / 1e3:g} ms" for sigma in SIGMAS_US)]
     first, second, floor = (
-        [_estimate(column) for column in (apart.mean(axis=1), *apart.T)]
+        [Estimate.of_draws(column) for column in (apart.mean(axis=1), *apart.T)]
         for apart in (before.to_measured, after.to_measured, after.between)
     )
     rows = [ErrorRow(*row) for row in zip(names, first, second, floor, strict=True)]
@@ -411,9 +409,3 @@ def _mean_square(apart: Array) -> Array:
     if not apart.size:
         return np.zeros(len(SIGMAS_US))
     return np.asarray((apart * apart).mean(axis=0))
-
-
-def _estimate(values: Array) -> Estimate:
-    """Return the mean, and the range of the middle 95 % of the draws."""
-    low, high = np.quantile(values, [0.025, 0.975])
-    return Estimate(float(values.mean()), (float(low), float(high)))

@@ -183,7 +183,6 @@ def ranked(reference: Reference, states: Sequence[State], parameters: Sequence[i
 def _ranked(
     reference: Reference, models: Sequence[Sequence[Ensemble]], parameters: Sequence[int]
 ) -> Ranking:
-    """Rank models, of which each has an ensemble a view."""
     each = zip(models, parameters, strict=True)
     scores = np.array([scored(reference, *one) for one in each])
     best, observed = int(np.argmax(scores)), reference.observed[BOTH]

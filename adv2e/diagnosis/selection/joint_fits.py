@@ -49,7 +49,6 @@ class JointFit:
 
 
 def count_parameters(fits: Sequence[Fitted]) -> int:
-    """Return the number of parameters that fits have together."""
     return sum(len(fit.candidate.parameters) for fit in fits)
 
 

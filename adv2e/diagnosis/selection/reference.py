@@ -51,7 +51,6 @@ class State:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the effects that were added."""
         return tuple(fit.candidate.name for fit in self.fits)
 
     @property
@@ -65,7 +64,6 @@ class State:
         return self.left <= FITTED
 
     def beyond(self, ground: State) -> tuple[Fitted, ...]:
-        """Return the effects that were added to those of another model."""
         return self.fits[len(ground.fits) :]
 
 
@@ -93,10 +91,8 @@ class Reference:
 
     Parameters
     ----------
-    sampler : Sampler
     observed : (views, statistics)
         Of the recording.
-    declared : Config
     error : FrameError, optional
         Of the statistics.
     log : callable
@@ -235,9 +231,7 @@ class Reference:
         return Fitted(joint, self.declared, point, reach=_REACH)
 
     def misfit(self, state: State, view: int = BOTH) -> float:
-        """Return the misfit of a model to the recording."""
         return state.ensembles[view].misfit(self.observed[view])
 
     def likelihood(self, state: State, view: int = BOTH) -> float:
-        """Return the log likelihood of the recording under a model."""
         return state.ensembles[view].log_likelihood(self.observed[view])

@@ -77,7 +77,6 @@ class Outcome:
 
     @property
     def alternatives(self) -> list[str]:
-        """Effects that cannot be told from one of those that were added."""
         alike = frozenset().union(*self.state.alternatives.values())
         return sorted(alike - set(self.state.names))
 
@@ -98,7 +97,7 @@ class Search:
         return state.ensembles[view].probability(self.reference.observed[view])
 
     def judged(self, state: State, view: int) -> float:
-        """Return the same, to decide by whether something is left.
+        """Return the probability of the residual, to decide whether another effect is missing.
 
         Where it is so rare that the tail of a curve tells it, further simulations are counted.
         """
@@ -125,7 +124,6 @@ class Search:
         return self._taken_away(self.declared, state, state.ensembles[view].floor, view)
 
     def run(self) -> Outcome:
-        """Search forward and backward."""
         chance = self.probability(self.declared)
         self.reference.log(f"declared model: probability of the residual {chance:.2g}")
         state = self._backward(self._forward(self.declared))
@@ -381,7 +379,6 @@ class Search:
         return most or self._is_something_left(state)
 
     def _without(self, state: State, fit: Fitted) -> State:
-        """Return the model without one of its effects, the others fitted again."""
         self.reference.begin(f"searching: is {fit.candidate.name} needed")
         rest = tuple(other for other in state.fits if other is not fit)
         without = self.reference.settled(rest, state.ensembles[BOTH].sd)

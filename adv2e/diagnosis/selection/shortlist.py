@@ -30,7 +30,6 @@ class Trial:
 
     @property
     def name(self) -> str:
-        """The effect's name."""
         return self.fit.candidate.name
 
 
@@ -86,7 +85,6 @@ def shortlisted(reference: Reference, state: State, candidates: Sequence[Candida
 
 
 def best_forms(trials: Sequence[Trial]) -> list[Trial]:
-    """Return the first trial of each effect."""
     best: dict[str, Trial] = {}
     for trial in trials:
         best.setdefault(trial.name, trial)

@@ -6,7 +6,7 @@ import dataclasses
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -29,27 +29,6 @@ from adv2e.light.interpolation import make_upsampler
 from adv2e.light.interpolation.linear import instant_ns, neighbours
 from adv2e.pixel.steps import PRECISE, Coarseness
 
-# ---- Progress of a diagnosis.
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Progress of a diagnosis: its stage, and the simulations done.
-
-    The total number of simulations is not known before: it depends on their results.
-
-    Attributes
-    ----------
-    stage : str
-        In a few words.
-    simulations : int
-        Done since the diagnosis began, in all stages.
-    """
-
-    stage: str
-    simulations: int
-
-
 Result = TypeVar("Result")
 
 _SEEDS = 1_000_000
@@ -61,33 +40,36 @@ _ROUGH = Coarseness(5.0, 2.5)
 class Simulator:
     """Turns configurations into streams, in threads: a simulation in each.
 
-    `progress` is told of each stage that begins and of each simulation that is done.
+    `progress` takes the stage, in a few words, and the number of simulations done in all stages: at
+    each stage that begins, and after each simulation.
     """
 
     def __init__(
         self,
         evidence: Evidence,
         threads: int,
-        progress: Callable[[Progress], None] = lambda now: None,
+        progress: Callable[[str, int], None] = lambda stage, simulations: None,
     ) -> None:
         self._evidence, self._threads, self._progress = evidence, threads, progress
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="adv2e-simulate")
         self._frames, self._counting = FrameCache(), threading.Lock()
-        self._light: Callable[[Config], Instants] = self._recorded
+        self._light: Callable[[Config], Instants] = lambda config: self._frames.of(
+            config, lambda: evidence.instants(config)
+        )
         self.done, self._stage = 0, ""
 
     def begin(self, stage: str) -> None:
         """Begin a stage: its name is reported with the simulations that follow."""
         with self._counting:
             self._stage = stage
-            self._progress(Progress(stage, self.done))
+            self._progress(stage, self.done)
 
     def of(self, evidence: Evidence) -> Simulator:
-        """Return the same for another recording; nobody is told of its progress."""
+        """Return a simulator of another recording, which reports no progress."""
         return Simulator(evidence, self._threads)
 
     def there_and_back(self, config: Config, shift_px: tuple[float, float]) -> Simulator:
-        """Return the same for `config` and frames that were moved by `shift_px` and back."""
+        """Return a simulator of frames that were shifted by `shift_px` and back, for `config`."""
         times_ns, light = self._light(config)
         x, y = shift_px
         moved = np.array([shifted(shifted(one, (x, y)), (-x, -y)) for one in light])
@@ -96,7 +78,6 @@ class Simulator:
         return made
 
     def close(self) -> None:
-        """Drop what has not begun."""
         self._pool.shutdown(cancel_futures=True)
 
     def stream(self, config: Config, seed: int, *, rough: bool = False) -> Stream:
@@ -113,17 +94,12 @@ class Simulator:
         )
         with self._counting:
             self.done += 1
-            self._progress(Progress(self._stage, self.done))
+            self._progress(self._stage, self.done)
         first, last = evidence.times_s[0] * 1e6, evidence.times_s[-1] * 1e6
         return Stream.of(events, evidence.width, evidence.height).between(first, last)
 
     def streams(self, config: Config, seeds: Iterable[int]) -> list[Stream]:
-        """Return the events of simulations of one model."""
         return self.map(lambda seed: self.stream(config, seed), seeds)
-
-    def _recorded(self, config: Config) -> Instants:
-        """Return the light of the recording's frames, and what is made of them once."""
-        return self._frames.of(config, lambda: self._evidence.instants(config))
 
     def map(self, work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:
         """Return ``work`` of each row of the columns, worked on at the same time."""

@@ -27,7 +27,6 @@ class Entry:
 
     Attributes
     ----------
-    name : str
     meaning : str
         What it measures, in a sentence.
     unit : str
@@ -53,7 +52,6 @@ def counted(value: float) -> float:
 
 
 def exponential(value: float) -> float:
-    """Return the exponential of a natural logarithm, without overflow."""
     return math.exp(min(value, 700.0))
 
 
@@ -78,10 +76,8 @@ class Group:
 
     Attributes
     ----------
-    title : str
     least : float, or a sequence of one for each statistic
         Deviation below which none counts as known.
-    entries : list of Entry
     count : callable
         Takes a stream, returns sums that add up over the parts of the data, (parts, numbers).
     values : callable
@@ -99,7 +95,6 @@ class Group:
 
 
 def numbers(named: Iterable[tuple[str, str]], unit: str = "events") -> list[Entry]:
-    """Return the entries of numbers of events, by name and meaning."""
     return [Entry(name, f"number of {meaning}", unit, counted) for name, meaning in named]
 
 

@@ -93,7 +93,6 @@ def compressed(z: Array) -> Array:
 
 
 def expanded(compressed: Array | float) -> Array:
-    """Return deviations as they were before they were compressed."""
     return np.asarray(_KNEE * np.sinh(np.asarray(compressed) / _KNEE))
 
 
@@ -114,7 +113,6 @@ class Ensemble:
 
     @cached_property
     def mean(self) -> Array:
-        """Mean in compressed deviations."""
         return np.asarray(self.sample.mean(axis=0))
 
     @cached_property
@@ -124,8 +122,14 @@ class Ensemble:
 
     def z(self, values: Array) -> Array:
         """Return z-scores: measured statistics less the mean of this model, in its deviations."""
-        inflation = math.sqrt(1.0 + 1.0 / len(self.sample))
-        return np.asarray((self.scale.of_values(values) - self.mean) / (self.sd * inflation))
+        return self._deviations(self.scale.of_values(values))
+
+    def _deviations(self, compressed: Array) -> Array:
+        return np.asarray((compressed - self.mean) / (self.sd * self._inflation))
+
+    @property
+    def _inflation(self) -> float:
+        return math.sqrt(1.0 + 1.0 / len(self.sample))  # a mean of few is not known well
 
     def misfit(self, values: Array) -> float:
         """Return the mean square of the uncorrelated deviations of measured statistics."""
@@ -133,7 +137,6 @@ class Ensemble:
         return float(np.mean(white * white))
 
     def log_likelihood(self, values: Array) -> float:
-        """Return the log likelihood of measured statistics, but for a constant."""
         white = self.scale.whitening @ self.z(values)
         return float(-0.5 * white @ white - np.log(self.sd).sum())
 
@@ -145,9 +148,8 @@ class Ensemble:
         """
         z, white = self.z(values), self.scale.whitening
         downhill = white.T @ (white @ z)
-        inflation = math.sqrt(1.0 + 1.0 / len(self.sample))
         apart = (self.sample - self.mean) / self.sd
-        of_mean = apart @ (downhill / inflation)
+        of_mean = apart @ (downhill / self._inflation)
         free = self.sd > _LEAST_SD
         of_sd = 0.5 * (apart**2 - 1.0) @ np.where(free, downhill * z - 1.0, 0.0)
         return np.asarray(of_mean + of_sd)
@@ -209,8 +211,7 @@ class Ensemble:
         As :meth:`probability`, by rank alone: statistics that are small counts of rare events have
         no tail that a curve would fit.  `further`, (seeds, statistics), in compressed deviations.
         """
-        inflation = math.sqrt(1.0 + 1.0 / len(self.sample))
-        z = (further - self.mean) / (self.sd * inflation)
+        z = self._deviations(further)
         white = z @ self.scale.whitening.T
         found = (
             (np.mean(white * white, axis=1), self.misfit(values)),
@@ -228,21 +229,16 @@ class Ensemble:
         """Return the misfit, and the largest deviation, that have this probability or less."""
         misfits, largest = self._left_out
         share = 0.5 * probability  # the smaller of two decides
-        return (
-            _value(misfits, share, _log_normal_value),
-            _value(largest, share, _gumbel_value),
-        )
+        return (_value(misfits, share, _log_normal_value), _value(largest, share, _gumbel_value))
 
 
 def _value(sample: Array, share: float, beyond: Callable[[Array, float], float]) -> float:
-    """Return the value that `share` or less of the distribution of `sample` exceeds."""
     rank = np.sort(sample)[::-1]
     within = int(share * (len(sample) + 1.0))
     return float(rank[within - 1] if within else max(rank[0], beyond(sample, share)))
 
 
 def _tail(sample: Array, value: float, beyond: Callable[[Array, float], float]) -> float:
-    """Return the probability of `value` or more under the distribution of `sample`."""
     rank = (1.0 + np.count_nonzero(sample >= value)) / (len(sample) + 1.0)
     return float(rank if value <= sample.max() else min(rank, beyond(sample, value)))
 

@@ -22,7 +22,7 @@ def keeps_time(hz: NDArray[Any], scene: Scene) -> NDArray[np.bool_]:
 
 
 def prominence(rate: NDArray[Any], reach: int, padding: int = 1) -> Array:
-    """Return by how much lines of rates, (..., bins), stand out, as logarithms.
+    """Return the prominence of spectral lines of rates, (..., bins), as logarithms.
 
     Power less the median of that of `reach` frequencies to each side, of which there are `padding`
     times as many as without zeros behind the rate, (..., padding x bins // 2 + 1).

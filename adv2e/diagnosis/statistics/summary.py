@@ -42,7 +42,6 @@ class SummaryStatistics:
 
     Parameters
     ----------
-    scene : Scene
     pilot : sequence of Stream
         Simulations of the declared model, from which is known what to expect.
     besides : sequence of Group
@@ -103,7 +102,6 @@ class SummaryStatistics:
         return np.concatenate(columns, axis=1)
 
     def sample(self, streams: Iterable[Stream]) -> Array:
-        """Return the statistics of several streams, (streams, views, statistics)."""
         return np.array([self.measure(stream) for stream in streams])
 
 
@@ -115,8 +113,6 @@ class Sampler:
 
     Parameters
     ----------
-    simulator : Simulator
-    statistics : SummaryStatistics
     bias : (views, statistics)
         Taken off all statistics: what they owe to the interpolation between frames.
     is_rough : bool
@@ -137,7 +133,6 @@ class Sampler:
 
     @cached_property
     def rough(self) -> Sampler:
-        """The same with rougher simulations."""
         return Sampler(self.simulator, self.statistics, self._bias, is_rough=True)
 
     def _measured(self, simulator: Simulator, config: Config, seed: int) -> Array:

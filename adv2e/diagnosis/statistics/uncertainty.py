@@ -94,11 +94,10 @@ class FrameError:
 
     @classmethod
     def none(cls, shape: tuple[int, ...]) -> FrameError:
-        """Return no error."""
         return cls(np.zeros(shape), np.zeros(shape))
 
     def __add__(self, other: FrameError) -> FrameError:
-        """Return both errors, which know nothing of each other."""
+        """Return the sum of two independent errors: biases add, deviations in quadrature."""
         return FrameError(self.bias + other.bias, np.hypot(self.sd, other.sd))
 
     def blurred(self, sample: Array, view: int, stream: int) -> Array:
@@ -195,7 +194,6 @@ class Pilot:
 
     @cached_property
     def sample(self) -> Array:
-        """Their statistics, (seeds, views, statistics)."""
         return self.statistics.sample(self.streams.values())
 
     @cached_property

@@ -10,21 +10,13 @@ from adv2e.config import to_dict
 from adv2e.config.tree import set_key
 from adv2e.diagnosis.tables.latency import LatencyProblem
 from adv2e.diagnosis.tables.noise_problem import NoiseProblem
-from adv2e.diagnosis.tables.problem import Declared, Settings, is_key
+from adv2e.diagnosis.tables.problem import Declared, Settings
 from adv2e.diagnosis.tables.selection import Choice, FittedSet, Selector
 from adv2e.diagnosis.tables.table import Latencies, Table, measurements_of
 from adv2e.errors import DataError
 from adv2e.files.regular import shown
 from adv2e.reports.markup import OF_TABLES
-from adv2e.reports.result import (
-    Band,
-    Curve,
-    Diagnosis,
-    ErrorRow,
-    Estimate,
-    Finding,
-    Rejected,
-)
+from adv2e.reports.result import Band, Curve, Diagnosis, ErrorRow, Estimate, Finding, Rejected
 
 _REMARKS = {
     "consistent": "The declared model fits the table within its errors: keep that model as it is.",
@@ -47,7 +39,6 @@ def characterise(table: Table, declared: Declared, settings: Settings | None = N
         Of latencies or of noise rates (:mod:`adv2e.diagnosis.tables.table`).
     declared : Declared
         Written keys are held; a change of one is a finding.
-    settings : Settings, optional
 
     Raises
     ------
@@ -66,7 +57,7 @@ def characterise(table: Table, declared: Declared, settings: Settings | None = N
     # the declared configuration with what was fitted; effects that are not found are off
     model = to_dict(declared.config)
     for key, value in {**problem.neutral, **found}.items():
-        if is_key(key):
+        if "[" not in key:  # or it is no key, but a threshold of the table
             set_key(model, key, value)
     effects = _findings(after, selector)
     change = f"error on light held out: {before.error:.3g} before, {after.error:.3g} after"

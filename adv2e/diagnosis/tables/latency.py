@@ -10,14 +10,7 @@ from numpy.typing import NDArray
 
 from adv2e.config.model import Pixel, Sampling
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
-from adv2e.diagnosis.tables.problem import (
-    Array,
-    Declared,
-    Problem,
-    Settings,
-    of_one,
-    row_errors,
-)
+from adv2e.diagnosis.tables.problem import Array, Declared, Problem, Settings, of_one, row_errors
 from adv2e.diagnosis.tables.table import Latencies
 from adv2e.effects.pixel.initial_reference import SETTLED
 from adv2e.effects.pixel.log_response import LogResponse
@@ -91,10 +84,7 @@ class LatencyProblem(Problem):
 
     Parameters
     ----------
-    data : Latencies
-    declared : Declared
     test : (rows,) of bool
-    settings : Settings
 
     Raises
     ------
@@ -130,7 +120,7 @@ class LatencyProblem(Problem):
             data.error, self.measured, cells, ASSUMED_ERROR, LEAST_ERROR, settings.error
         )
         self._ends_us = [span * float(data.latency_us.max()) for span in _SPANS]
-        self._has_low_pass = not declared.switched_off("pixel.low_pass")
+        self._has_low_pass = declared.written.get("pixel.low_pass", "on") is not None
         self.nuisances = self._nuisances()
         self.candidates = list(self._candidates(data.latency_us))
         known = DARK_CUTOFF in declared.written or not self._has_low_pass
@@ -197,7 +187,6 @@ class LatencyProblem(Problem):
         return key if group == first else f"{key}[bias={bias}]"
 
     def _thresholds(self, which: Sequence[int]) -> Candidate:
-        """Return the thresholds of some groups, to be fitted."""
         parameters, starts = [], []
         for group in which:
             most = float(self._contrast[self._group == group].min())

@@ -49,6 +49,7 @@ from adv2e.diagnosis.tables.threshold_noise import (
     HIGHEST,
     SAMPLING_SHIFT,
     event_rates,
+    lagrange_weights,
 )
 from adv2e.effects.hooks import LONGEST_US
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
@@ -111,17 +112,14 @@ class Rates:
 
     @property
     def leak(self) -> Array:
-        """Leak events of the typical pixel."""
         return _typical(self.leak_of, self.weights)
 
     @property
     def on(self) -> Array:
-        """ON events of the typical pixel."""
         return _typical(self.leak_of + self.on_of, self.weights)
 
     @property
     def off(self) -> Array:
-        """OFF events of the typical pixel."""
         return _typical(self.off_of, self.weights)
 
     @property
@@ -132,12 +130,10 @@ class Rates:
 
     @property
     def off_mean(self) -> Array:
-        """OFF events, mean over all pixels."""
         mean: Array = self.off_of @ self.weights
         return mean
 
     def at(self, lights: NDArray[np.int64]) -> Rates:
-        """Return the rates at some of the lights, by their numbers."""
         parts = (self.leak_of[lights], self.on_of[lights], self.off_of[lights])
         return Rates(self.weights, *parts, self.hot_fraction, self.hot_hz)
 
@@ -220,7 +216,7 @@ class Ruler:
         self._along = reach * np.sinh(np.linspace(-8.0, 8.0, 2001)) / np.sinh(8.0)
 
     def place(self, apart: Array) -> Array:
-        """Return at which mark a difference is, 0 at 0."""
+        """Return the mark of a threshold difference; 0 where both are equal."""
         return np.asarray(apart / self._step + np.arcsinh(apart / self._fine))
 
     def marks(self, middle: float = 0.0) -> tuple[Array, Array]:
@@ -292,7 +288,6 @@ class Law:
         Corner of the slower pole [rad/s].
     ratio : float
         Over that of the faster one; 0: there is but one.
-    dead_time_s, leak_hz : float
     shift : float
         How much farther levels are, in standard deviations, as the noise is sampled.
     """
@@ -383,17 +378,10 @@ def _cubic(place: Array, count: int) -> tuple[NDArray[np.int64], list[Array]]:
     """Return the first of four kept values about each place, and their weights (Lagrange)."""
     place = np.clip(place, 0.0, count - 1.0)
     first = np.clip(place.astype(np.int64) - 1, 0, count - 4)
-    t = place - first
-    return first, [
-        -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0,
-        t * (t - 2.0) * (t - 3.0) / 2.0,
-        -t * (t - 1.0) * (t - 3.0) / 2.0,
-        t * (t - 1.0) * (t - 2.0) / 6.0,
-    ]
+    return first, lagrange_weights(place - first)
 
 
 def _laws(sources: NoisySources, light: Array, leak: Array) -> list[Law]:
-    """Return the law at each light, with its leak [Hz]."""
     corner = sources.dark_cutoff_hz + (sources.cutoff_hz - sources.dark_cutoff_hz) * light
     white = 2.0 * np.pi * max(sources.cutoff_hz, sources.dark_cutoff_hz)
     sampled_s = min(sources.noise_step / white, LONGEST_US * 1e-6)

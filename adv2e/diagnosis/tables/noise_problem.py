@@ -58,10 +58,7 @@ class NoiseProblem(Problem):
 
     Parameters
     ----------
-    data : Noise
-    declared : Declared
     test : (rows,) of bool
-    settings : Settings
 
     References
     ----------
@@ -131,7 +128,6 @@ class NoiseProblem(Problem):
             )
 
     def rates(self, values: Mapping[str, float], light: Array) -> Rates:
-        """Return the rates at `light`, in the table's unit."""
         pixel = self.declared.config.pixel
         noise, corner = pixel.photoreceptor_noise, pixel.low_pass
         sources = NoisySources(
@@ -256,7 +252,6 @@ def _drawn_share(share: Array | float, pixels: Array | float) -> tuple[Array, Ar
 
 
 def _share_error(data: Noise, kind: str, row: int) -> float:
-    """Return the relative error of the rate that a share counts as."""
     share, error = _drawn_share(float(data.rates[kind][row]), float(data.pixels[row]))
     ends = np.clip([share - 0.5 * error, share + 0.5 * error], 1e-9, 1.0 - 1e-9)
     return float(np.diff(np.log(_as_poisson(_number_of(kind), ends)))[0])

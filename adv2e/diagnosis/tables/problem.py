@@ -69,10 +69,6 @@ class Declared:
     config: Config
     written: Mapping[str, Any]
 
-    def switched_off(self, section: str) -> bool:
-        """Tell whether an effect was declared as absent (null)."""
-        return section in self.written and self.written[section] is None
-
     def held(self, path: str) -> float:
         """Return the number written for a key; 0, off, where none is or its section is off.
 
@@ -123,10 +119,8 @@ class Problem(ABC):
         Rows that make one curve over the light, by its title.
     nuisances : Candidate
         Keys that are always fitted; in a name with a bracket, what is no key of the configuration.
-    candidates : list of Candidate
     neutral : mapping of str to float
         Keys that this model has at a value other than the default, where not written.
-    notes : list of str
     step : float
         By which logarithms of parameters are moved for a derivative.
     tolerance : float
@@ -169,11 +163,6 @@ def of_one(name: str, key: str, *starts: float, reach: float = 30.0) -> Candidat
     """Return an effect with one key, which reaches by a factor beyond all starts."""
     parameter = FitParameter(key, min(starts) / reach, max(starts) * reach)
     return Candidate(name, (parameter,), tuple((start,) for start in starts))
-
-
-def is_key(name: str) -> bool:
-    """Tell whether a nuisance is a key of the configuration, not something else of the table."""
-    return "[" not in name
 
 
 def row_errors(

@@ -66,7 +66,6 @@ class FittedSet:
 
     Attributes
     ----------
-    effects : tuple of Candidate
     joint : Candidate
         What was fitted: nuisances, then the effects.
     point : (parameters,)
@@ -86,12 +85,10 @@ class FittedSet:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the effects."""
         return tuple(effect.name for effect in self.effects)
 
     @property
     def settings(self) -> dict[str, float]:
-        """Fitted values by key, and those that go with them."""
         return self.joint.settings(self.point)
 
     @property
@@ -131,7 +128,6 @@ class Selector:
         return np.array([self._mean_square(self.problem.error, unit) for unit in self._units])
 
     def select(self) -> Choice:
-        """Return the verdict, with all sets tried."""
         candidates, log = self.problem.candidates, self._settings.log
         before = self.fitted(())
         p = self.drawn(before).p
@@ -230,15 +226,10 @@ class Selector:
         return Draws(logs, ideal + moved @ slopes.T, (above + 1) / (len(drawn) + 1))
 
     def predicted(self, joint: Candidate, point: Array) -> Array:
-        """Return the logarithms that a model predicts, (rows,)."""
         return self.problem.predict(joint.settings(point))
 
     def _fit(
-        self,
-        joint: Candidate,
-        rows: NDArray[np.bool_],
-        starts: Sequence[Array],
-        tolerance: float,
+        self, joint: Candidate, rows: NDArray[np.bool_], starts: Sequence[Array], tolerance: float
     ) -> tuple[Array, float]:
         def residuals(logs: Array) -> Array:
             gap = (self.problem.measured - self.predicted(joint, logs)) / self.problem.error
@@ -266,10 +257,7 @@ def _borders(joint: Candidate) -> Array:
 
 
 def _rejected(
-    tried: list[list[FittedSet]],
-    before: FittedSet,
-    after: FittedSet,
-    alternatives: list[FittedSet],
+    tried: list[list[FittedSet]], before: FittedSet, after: FittedSet, alternatives: list[FittedSet]
 ) -> list[Rejected]:
     """Return the rejected sets with reasons; of two and more effects, the best of each size."""
     out = []

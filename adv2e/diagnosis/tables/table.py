@@ -46,7 +46,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError, UsageError
-from adv2e.files.regular import read_text_bytes
+from adv2e.files.regular import read_text
 
 DELIMITERS = ",;\t"
 
@@ -62,8 +62,6 @@ class Table:
     ----------
     name : str
         The file, for messages.
-    columns : tuple of str
-    rows : tuple of tuples of str
     lines : tuple of int
         Line number of each row, from 1.
     decimal_comma : bool
@@ -80,7 +78,6 @@ class Table:
         return len(self.rows)
 
     def texts(self, column: str) -> list[str]:
-        """Return the cells of a column."""
         at = self.columns.index(column)
         return [row[at] for row in self.rows]
 
@@ -121,13 +118,11 @@ class Table:
         return float(text.replace(",", ".") if self.decimal_comma else text)
 
     def wrong(self, row: int, column: str, text: str) -> DataError:
-        """Return the error that says `text` of one cell."""
         cell = self.texts(column)[row]
         found = f"{text}, got {cell!r}" if cell else f"is empty, {text}"
         return DataError(f"{self.name}:{self.lines[row]}: {column}: {found}")
 
     def kept(self, keep: Sequence[bool]) -> Table:
-        """Return the table of the rows where `keep` is true."""
         rows = tuple(row for row, use in zip(self.rows, keep, strict=True) if use)
         lines = tuple(line for line, use in zip(self.lines, keep, strict=True) if use)
         return Table(self.name, self.columns, rows, lines, self.decimal_comma)
@@ -175,14 +170,7 @@ def read_table(path: str | Path) -> Table:
         The file cannot be read, has no header or no rows, a name stands twice in the header, or a
         row has another number of cells; file and line are named.
     """
-    path = Path(path)
-    try:
-        text = read_text_bytes(path).decode("utf-8-sig")
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise DataError(f"{path}: byte {error.start} is not UTF-8 text") from None
-    return parse_table(text, str(path))
+    return parse_table(read_text(Path(path)), str(Path(path)))
 
 
 def parse_table(text: str, name: str) -> Table:
@@ -342,7 +330,6 @@ def _latencies(table: Table, column: str, light: Array, unit: str) -> Latencies:
 
 
 def _standard_error_us(table: Table) -> Array:
-    """Return the standard error of each latency; NaN: not given."""
 
     def column_of(what: str) -> tuple[str, Array]:
         names = {f"latency_{what}_{unit}": factor for unit, factor in TIMES.items()}

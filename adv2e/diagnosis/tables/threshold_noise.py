@@ -280,14 +280,17 @@ def _cubic_weights(z: Array, places: Array) -> tuple[NDArray[np.int64], Array]:
     """Return the first of four places about each z, and their weights, (4, ...) (Lagrange)."""
     at = (z - places[0]) / (places[1] - places[0])
     first = np.clip(at.astype(np.int64) - 1, 0, _PLACES - 4)
-    t = at - first
-    weights = [
+    return first, np.stack(lagrange_weights(at - first))
+
+
+def lagrange_weights(t: Array) -> list[Array]:
+    """Return the weights of values at 0, 1, 2 and 3 in a cubic at `t`."""
+    return [
         -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0,
         t * (t - 2.0) * (t - 3.0) / 2.0,
         -t * (t - 1.0) * (t - 3.0) / 2.0,
         t * (t - 1.0) * (t - 2.0) / 6.0,
     ]
-    return first, np.stack(weights)
 
 
 def _interpolated(here: tuple[NDArray[np.int64], Array], values: Array) -> Array:

@@ -35,11 +35,9 @@ from numpy.typing import NDArray
 
 from adv2e.effects.hooks import Frames, Hooks
 
-LABELS = {
-    "black_level": "black level of the frames",
-}
+LABELS = {"black_level": "black level of the frames"}
 SEPARATED_BY = {
-    "black_level": "one motion over very dark parts: contrast is lost there and nowhere else",
+    "black_level": "one motion over very dark parts: contrast is lost there and nowhere else"
 }
 
 _FALL_PX = 1.5
@@ -55,7 +53,6 @@ class BlackLevelHooks(Hooks):
         self._dn, self._depth = dn, depth_dn
 
     def light(self, frames: Frames) -> Frames:
-        """Yield the frames with the constant."""
         for t_ns, light in frames:
             made = light + light.dtype.type(self._dn)
             if self._depth:

@@ -20,11 +20,9 @@ from __future__ import annotations
 
 from adv2e.effects.hooks import Frames, Hooks
 
-LABELS = {
-    "clock_drift": "drift of the frames' clock",
-}
+LABELS = {"clock_drift": "drift of the frames' clock"}
 SEPARATED_BY = {
-    "clock_drift": "a long recording: the delay between frames and events grows steadily",
+    "clock_drift": "a long recording: the delay between frames and events grows steadily"
 }
 
 
@@ -38,7 +36,6 @@ class ClockDriftHooks(Hooks):
         self._ppm = ppm
 
     def light(self, frames: Frames) -> Frames:
-        """Yield the frames at their times."""
         first_ns: int | None = None
         for t_ns, light in frames:
             first_ns = t_ns if first_ns is None else first_ns

@@ -21,11 +21,9 @@ from __future__ import annotations
 
 from adv2e.effects.hooks import Frames, Hooks
 
-LABELS = {
-    "clock_offset": "offset of the frames' clock",
-}
+LABELS = {"clock_offset": "offset of the frames' clock"}
 SEPARATED_BY = {
-    "clock_offset": "fast and slow motion: the delay is the same for all pixels, speeds and light",
+    "clock_offset": "fast and slow motion: the delay is the same for all pixels, speeds and light"
 }
 
 
@@ -39,6 +37,5 @@ class ClockOffsetHooks(Hooks):
         self._offset_ns = round(offset_us * 1e3)
 
     def light(self, frames: Frames) -> Frames:
-        """Yield the frames at their times."""
         for t_ns, light in frames:
             yield t_ns + self._offset_ns, light

@@ -43,11 +43,9 @@ from numpy.typing import DTypeLike, NDArray
 
 from adv2e.errors import ConfigError, DataError
 
-LABELS = {
-    "frame_encoding": "encoding of the frames",
-}
+LABELS = {"frame_encoding": "encoding of the frames"}
 SEPARATED_BY = {
-    "frame_encoding": "one motion over dark and bright parts: the ratio of events between them",
+    "frame_encoding": "one motion over dark and bright parts: the ratio of events between them"
 }
 
 UNKNOWN = "unknown: "

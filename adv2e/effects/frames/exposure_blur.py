@@ -48,12 +48,8 @@ from numpy.typing import NDArray
 from adv2e.effects.hooks import Frames, Hooks, LightFrame
 from adv2e.kernel.effect_loops import sharpen
 
-LABELS = {
-    "exposure_blur": "exposure of the frames",
-}
-SEPARATED_BY = {
-    "exposure_blur": "small, fast features at two exposure times",
-}
+LABELS = {"exposure_blur": "exposure of the frames"}
+SEPARATED_BY = {"exposure_blur": "small, fast features at two exposure times"}
 
 Array = NDArray[np.float64]
 
@@ -84,7 +80,8 @@ def means(times: Array, exposure: float) -> Array:
     widths = np.minimum(exposure, 2.0 * np.minimum(times - times[0], times[-1] - times))
     first, last = (times - 0.5 * widths)[:, None], (times + 0.5 * widths)[:, None]
     middles = 0.5 * (times[1:] + times[:-1])
-    steps = _covered(first, last, np.append(times[0], middles), np.append(middles, times[-1]))
+    starts, ends = np.append(times[0], middles), np.append(middles, times[-1])
+    steps = np.clip(np.minimum(ends, last) - np.maximum(starts, first), 0.0, None)
     lines = _under_hats(last, times) - _under_hats(first, times)
     open_ = widths > 0.0
     scale = np.where(open_, widths, 1.0)[:, None]
@@ -95,11 +92,6 @@ def means(times: Array, exposure: float) -> Array:
     share = np.clip((widths**2 / 12.0 - narrow) / way, 0.0, 1.0)[:, None]
     mixed = (1.0 - share) * steps + share * lines
     return np.asarray(np.where(open_[:, None], mixed, np.eye(times.size)))
-
-
-def _covered(first: Array, last: Array, starts: Array, ends: Array) -> Array:
-    """Return the overlap of first..last with each span, (n, spans)."""
-    return np.asarray(np.clip(np.minimum(ends, last) - np.maximum(starts, first), 0.0, None))
 
 
 def _under_hats(at: Array, times: Array) -> Array:
@@ -182,7 +174,6 @@ class ExposureBlurHooks(Hooks):
         return first
 
     def _block(self, held: list[LightFrame], begin: int, end: int) -> Frames:
-        """Yield the frames begin..end of those held, sharpened."""
         if begin == end:
             return
         origin = held[0][0]

@@ -29,11 +29,9 @@ from numpy.typing import NDArray
 from adv2e.effects.hooks import Hooks, Times
 from adv2e.parameters import Fit, Section, parameter
 
-LABELS = {
-    "flicker": "flicker of lamps",
-}
+LABELS = {"flicker": "flicker of lamps"}
 SEPARATED_BY = {
-    "flicker": "the same scene by daylight or direct current: the line in the rate disappears",
+    "flicker": "the same scene by daylight or direct current: the line in the rate disappears"
 }
 
 _STEPS_PER_PERIOD = 100
@@ -77,7 +75,6 @@ class FlickerHooks(Hooks):
         self.step_us = 1e6 / (_STEPS_PER_PERIOD * parameters.frequency_hz)
 
     def gain(self, times_s: Times) -> NDArray[np.float64]:
-        """Return the factors on the light, (n,)."""
         p = self.parameters
         # whole turns taken off first: an epoch time would lose the phase in rounding
         turns = np.remainder(times_s * p.frequency_hz, 1.0)

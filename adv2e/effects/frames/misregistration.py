@@ -33,11 +33,9 @@ from numpy.typing import NDArray
 
 from adv2e.effects.hooks import Frames, Hooks
 
-LABELS = {
-    "misregistration": "shift of the frames",
-}
+LABELS = {"misregistration": "shift of the frames"}
 SEPARATED_BY = {
-    "misregistration": "motion in two opposite directions: a shift stays, a delay turns round",
+    "misregistration": "motion in two opposite directions: a shift stays, a delay turns round"
 }
 
 _LEAST_DN = 0.05
@@ -121,6 +119,5 @@ class MisregistrationHooks(Hooks):
         self._shift_px = shift_px
 
     def light(self, frames: Frames) -> Frames:
-        """Yield the frames where the event pixels see them."""
         for t_ns, light in frames:
             yield t_ns, shifted(light, self._shift_px)

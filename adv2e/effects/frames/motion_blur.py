@@ -152,5 +152,4 @@ class MotionBlurHooks(Hooks):
 
 
 def _pairs(frames: Frames) -> Iterator[tuple[Any, Any]]:
-    """Yield each frame with the one that follows, the last with None."""
     return itertools.pairwise(itertools.chain(frames, [None]))

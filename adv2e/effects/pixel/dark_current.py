@@ -23,7 +23,7 @@ from adv2e.effects.hooks import Frames, Hooks
 from adv2e.parameters import Fit, Section, parameter
 
 SEPARATED_BY = {
-    "dark_current": "lag over more than one and a half decades of light: it levels off in the dark",
+    "dark_current": "lag over more than one and a half decades of light: it levels off in the dark"
 }
 
 
@@ -45,6 +45,5 @@ class DarkCurrentHooks(Hooks):
     Parameters = DarkCurrent
 
     def light(self, frames: Frames) -> Frames:
-        """Yield the frames with the constant."""
         for t_ns, light in frames:
             yield t_ns, light + light.dtype.type(self.parameters.dn)

@@ -21,9 +21,7 @@ from adv2e.events import Events
 from adv2e.kernel import rng
 from adv2e.parameters import Fit, Section, parameter
 
-SEPARATED_BY = {
-    "dead_pixels": "a texture moved across the whole sensor: some pixels stay silent",
-}
+SEPARATED_BY = {"dead_pixels": "a texture moved across the whole sensor: some pixels stay silent"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,13 +43,11 @@ class DeadPixelsHooks(Hooks):
     Parameters = DeadPixels
 
     def begin(self, view: View) -> None:
-        """Draw the dead pixels."""
         super().begin(view)
         pixels = np.arange(view.rows * view.columns)
         drawn = rng.uniform_array(view.seed, rng.DEAD_CHOICE, pixels, 0)
         self._alive = (drawn >= self.parameters.fraction).reshape(view.rows, view.columns)
 
     def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
-        """Yield the events of the other pixels."""
         for events in chunks:
             yield events[self._alive[events["y"], events["x"]]]

@@ -23,9 +23,7 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
-SEPARATED_BY = {
-    "hot_pixels": "a scene at rest, or a closed lens: few pixels hold most events",
-}
+SEPARATED_BY = {"hot_pixels": "a scene at rest, or a closed lens: few pixels hold most events"}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,9 +27,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-LABELS = {
-    "initial_reference": "reference at the first frame",
-}
+LABELS = {"initial_reference": "reference at the first frame"}
 
 Array = NDArray[np.float64]
 

@@ -50,9 +50,7 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
-LABELS = {
-    "photo_leak": "leak that grows with light",
-}
+LABELS = {"photo_leak": "leak that grows with light"}
 SEPARATED_BY = {
     "leak": "a scene at rest: regular ON events at every brightness, also in the dark",
     "photo_leak": "a scene at rest with bright and dark parts: regular ON events whose rate is"

@@ -40,10 +40,7 @@ class LogResponse(Section):
         source="e: no kink at the knee; least distance, see adv2e/kernel/README.md",
     )
     floor: float = parameter(
-        0.1,
-        unit="DN",
-        meaning="least value under a pure logarithm (linear_below: 0)",
-        above=0,
+        0.1, unit="DN", meaning="least value under a pure logarithm (linear_below: 0)", above=0
     )
 
     def __post_init__(self) -> None:

@@ -38,12 +38,10 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
-LABELS = {
-    "low_pass": "low-pass of the photoreceptor",
-}
+LABELS = {"low_pass": "low-pass of the photoreceptor"}
 SEPARATED_BY = {
     "low_pass": "the same motion in bright and dim light: its lag falls with the light, and so"
-    " does the tail after the motion stops",
+    " does the tail after the motion stops"
 }
 
 UPDATES = ("exact", "first_order_hold", "zero_order_hold", "euler", "paper")

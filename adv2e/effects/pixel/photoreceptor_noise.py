@@ -40,7 +40,7 @@ from adv2e.parameters import Fit, Section, parameter
 
 SEPARATED_BY = {
     "photoreceptor_noise": "a scene at rest: ON and OFF events that alternate, at a rate that"
-    " falls steeply with the threshold",
+    " falls steeply with the threshold"
 }
 
 

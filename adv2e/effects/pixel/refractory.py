@@ -22,12 +22,10 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
-LABELS = {
-    "refractory": "dead time",
-}
+LABELS = {"refractory": "dead time"}
 SEPARATED_BY = {
     "refractory": "fast, high-contrast edges: no two events of a pixel are nearer than a fixed"
-    " time, at every brightness, and more is lost the steeper the edge",
+    " time, at every brightness, and more is lost the steeper the edge"
 }
 
 

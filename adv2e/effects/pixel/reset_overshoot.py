@@ -29,12 +29,10 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
-LABELS = {
-    "reset_overshoot": "overshoot of the reset",
-}
+LABELS = {"reset_overshoot": "overshoot of the reset"}
 SEPARATED_BY = {
     "reset_overshoot": "edges of different steepness: the first event after a reset comes late or"
-    " early by the same contrast, whatever the steepness",
+    " early by the same contrast, whatever the steepness"
 }
 
 

@@ -32,7 +32,7 @@ from dataclasses import dataclass
 from adv2e.parameters import Fit, Section, parameter
 
 SEPARATED_BY = {
-    "shot_noise": "a scene at rest: ON and OFF events without order, fewer in bright light",
+    "shot_noise": "a scene at rest: ON and OFF events without order, fewer in bright light"
 }
 
 FALL_AT_WHITE = 0.75

@@ -27,7 +27,7 @@ from adv2e.parameters import Fit, Section, parameter
 
 SEPARATED_BY = {
     "slew_limit": "steps of several sizes (more than a factor of e) at the same light: latency"
-    " grows with the size of the step",
+    " grows with the size of the step"
 }
 
 

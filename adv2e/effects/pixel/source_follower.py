@@ -23,12 +23,10 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
-LABELS = {
-    "source_follower": "second low-pass (source follower)",
-}
+LABELS = {"source_follower": "second low-pass (source follower)"}
 SEPARATED_BY = {
     "source_follower": "fast and slow edges in bright light: it delays and weakens fast changes"
-    " at every brightness, while a clock offset shifts slow ones as much",
+    " at every brightness, while a clock offset shifts slow ones as much"
 }
 
 

@@ -26,12 +26,8 @@ from numpy.typing import NDArray
 
 from adv2e.errors import ConfigError
 
-LABELS = {
-    "threshold_drift": "drift of the thresholds",
-}
-SEPARATED_BY = {
-    "threshold_drift": "the same motion early and late in a long recording",
-}
+LABELS = {"threshold_drift": "drift of the thresholds"}
+SEPARATED_BY = {"threshold_drift": "the same motion early and late in a long recording"}
 
 
 def drift_factors(since_s: NDArray[np.float64], per_s: float) -> NDArray[np.float64]:

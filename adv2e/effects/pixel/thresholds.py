@@ -26,10 +26,7 @@ from dataclasses import dataclass
 
 from adv2e.parameters import Fit, Section, parameter
 
-LABELS = {
-    "thresholds": "contrast threshold",
-    "threshold_mismatch": "spread of the thresholds",
-}
+LABELS = {"thresholds": "contrast threshold", "threshold_mismatch": "spread of the thresholds"}
 SEPARATED_BY = {
     "thresholds": "a scene that returns to where it began, at two contrasts: signed steps then"
     " sum to zero only with the right thresholds, at every speed and brightness",

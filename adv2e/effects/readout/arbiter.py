@@ -37,12 +37,10 @@ from adv2e.kernel import rng
 from adv2e.kernel.effect_loops import EVENTS, NOBODY, Channel, Requests, serve
 from adv2e.parameters import Fit, Section, parameter
 
-LABELS = {
-    "readout": "time that the readout takes",
-}
+LABELS = {"readout": "time that the readout takes"}
 SEPARATED_BY = {
     "readout": "strong motion of the whole picture: delays grow with the rate of all pixels, and"
-    " events come row by row",
+    " events come row by row"
 }
 
 
@@ -74,7 +72,6 @@ class ArbiterHooks(Hooks):
     Parameters = Arbiter
 
     def begin(self, view: View) -> None:
-        """Empty the channel."""
         super().begin(view)
         pixels = view.rows * view.columns
         self._channel = Channel(
@@ -89,7 +86,6 @@ class ArbiterHooks(Hooks):
         self._origin_us = round(view.start_s * 1e6)
 
     def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
-        """Yield the events as they leave the channel."""
         asking, order = InOrder(), InOrder()
         for events in chunks:
             if not events.size:

@@ -22,12 +22,10 @@ from adv2e.events import Events, pixels_of
 from adv2e.kernel import rng
 from adv2e.parameters import Fit, Section, parameter
 
-LABELS = {
-    "event_loss": "lost events",
-}
+LABELS = {"event_loss": "lost events"}
 SEPARATED_BY = {
     "event_loss": "motion of a small and of a large part of the picture: a share that is lost"
-    " everywhere does not depend on the rate",
+    " everywhere does not depend on the rate"
 }
 
 
@@ -51,12 +49,10 @@ class EventLossHooks(Hooks):
     Parameters = EventLoss
 
     def begin(self, view: View) -> None:
-        """Start the numbers of the events of each pixel at 0."""
         super().begin(view)
         self._numbers = np.zeros(view.rows * view.columns, np.int64)
 
     def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
-        """Yield the events that are kept."""
         for events in chunks:
             pixels = pixels_of(events, self.view.columns)
             drawn = rng.next_uniforms(self.view.seed, rng.LOSS, pixels, self._numbers)

@@ -48,11 +48,9 @@ from numpy.typing import NDArray
 from adv2e.effects.hooks import Frames, Hooks, LightFrame, Times, View
 from adv2e.parameters import Fit, Section, parameter
 
-LABELS = {
-    "frame_coupling": "disturbance by the readout of frames",
-}
+LABELS = {"frame_coupling": "disturbance by the readout of frames"}
 SEPARATED_BY = {
-    "frame_coupling": "a scene at rest at two frame rates: the bursts stay with the frames",
+    "frame_coupling": "a scene at rest at two frame rates: the bursts stay with the frames"
 }
 
 _STEPS_PER_TAU = 12
@@ -112,7 +110,6 @@ class FrameCouplingHooks(Hooks):
 
     Parameters
     ----------
-    parameters : FrameCoupling
     exposed_us : float
         From a frame's time to the end of its exposure.
     every : int
@@ -134,7 +131,6 @@ class FrameCouplingHooks(Hooks):
         self.step_us = parameters.tau_us / _STEPS_PER_TAU
 
     def begin(self, view: View) -> None:
-        """Forget the frames of the recording before."""
         super().begin(view)
         # of each leap: its time, and the sum of what all up to it have left at that time
         self._leaps: list[float] = []
@@ -176,7 +172,6 @@ class FrameCouplingHooks(Hooks):
         self._sums.append(1.0 + left)
 
     def signal(self, times_s: Times) -> NDArray[np.float64]:
-        """Return the disturbance, (n,)."""
         left = self._left(times_s)
         if self._width_s:
             left = left - self._left(times_s - self._width_s)
@@ -202,7 +197,7 @@ class FrameCouplingHooks(Hooks):
         return left
 
     def longest_step_us(self, start_s: float, stop_s: float) -> float:
-        """Return its step, and no limit where the disturbance has decayed."""
+        """Return the step that resolves the disturbance [us]; no limit once it has decayed."""
         backs = (0.0, self._width_s) if self._width_s else (0.0,)
         return min(self._step_us(start_s - back, stop_s - back) for back in backs)
 

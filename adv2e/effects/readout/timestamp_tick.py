@@ -25,16 +25,11 @@ from adv2e.effects.hooks import Hooks
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.events import Events, sort_events
 
-LABELS = {
-    "timestamp_tick": "tick of the time stamps",
-}
-SEPARATED_BY = {
-    "timestamp_tick": "none needed: all times are multiples of the tick",
-}
+LABELS = {"timestamp_tick": "tick of the time stamps"}
+SEPARATED_BY = {"timestamp_tick": "none needed: all times are multiples of the tick"}
 
 
 def ticked(times_us: NDArray[np.int64], tick_us: float) -> NDArray[np.int64]:
-    """Return the tick at or after each time [us]."""
     if float(tick_us).is_integer():
         tick = int(tick_us)
         return -(-times_us // tick) * tick

@@ -113,7 +113,9 @@ class Paths:
             return self.L
         if motion is None:
             return 1 if is_unchanged(a, b) else self.L
-        if not all(_is_known(one) for one in motion):
+        if any(
+            one.unexplained > _UNEXPLAINED_MOST or np.any(one.score >= UNKNOWN) for one in motion
+        ):
             return self.L
         speeds = map(fastest, motion, bent or (None, None))
         return max(1, min(self.L, math.ceil(max(speeds) / self._max_motion_px)))
@@ -135,10 +137,6 @@ class Paths:
         found = estimate_motion(a, b)
         self._motions = [*self._motions[-2:], (a, b, found)]
         return found
-
-
-def _is_known(motion: Motion) -> bool:
-    return motion.unexplained <= _UNEXPLAINED_MOST and not np.any(motion.score >= UNKNOWN)
 
 
 class FlowUpsampler:

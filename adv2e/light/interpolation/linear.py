@@ -109,7 +109,6 @@ class LinearUpsampler:
         self.L = L
 
     def count(self, a: NDArray[Any], b: NDArray[Any], beside: Beside = NOTHING) -> int:
-        """Return `L`."""
         del a, b, beside
         return self.L
 

@@ -67,7 +67,7 @@ class Axis:
 
     def __init__(self, length: int, fixed: int | None, multiple: int) -> None:
         largest = LARGEST // multiple * multiple
-        self.size = fixed or min(_up(length, multiple), largest)
+        self.size = fixed or min(-(-length // multiple) * multiple, largest)
         self.padded = max(length, self.size)
         common = min(OVERLAP, self.size // 4)
         count = 1 + -(-(self.padded - self.size) // max(1, self.size - common))
@@ -101,7 +101,6 @@ def in_tiles(
         Takes a tile of each picture and returns one of the same size.
     fixed : (int or None, int or None)
         The only rows and columns that it takes; None: it takes multiples of `multiple`.
-    multiple : int
 
     Returns
     -------
@@ -131,12 +130,7 @@ def in_tiles(
     return made
 
 
-def _up(length: int, multiple: int) -> int:
-    return -(-length // multiple) * multiple
-
-
 def _ramp(length: int) -> Image:
-    """Return shares that grow from near 0 to near 1."""
     return ((np.arange(length) + 0.5) / length).astype(np.float32)
 
 
@@ -148,10 +142,8 @@ class NetworkUpsampler:
 
     Parameters
     ----------
-    network : Network
     paths : Paths
         Which say how many frames an interval gets.
-    threads : int
 
     Raises
     ------

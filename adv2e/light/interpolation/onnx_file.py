@@ -134,13 +134,11 @@ class Network:
 
     @property
     def text(self) -> str:
-        """Description of the network in a few words."""
         when = "at any time" if self.knows_time else "in the middle of two"
         colour = "colour" if self._images[0].channels > 1 else "grey"
         return f"{self.source['file']}: {colour}, {self.encoding}, {when}"
 
     def value(self, light: NDArray[Any]) -> NDArray[np.float32]:
-        """Return light [DN] as values that it was trained on."""
         return encode_light(light.astype(np.float32, copy=False), self.encoding)
 
     def ask(

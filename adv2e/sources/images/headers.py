@@ -281,7 +281,6 @@ class Tiff:
 
 
 def is_tiff(data: bytes) -> bool:
-    """Tell whether the bytes of a file begin as those of a TIFF."""
     return data[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 

@@ -45,11 +45,8 @@ def open_source(
 
     Parameters
     ----------
-    given : GivenTimes
-    selection : Selection
     pixel_format : str, optional
         One of `PIXEL_FORMATS`: raw video comes, of this `size`; default: Y4M does.
-    size : Size, optional
     file : binary file, optional
         Default: standard input.
 

@@ -116,7 +116,7 @@ class Stream:
         return self._seen
 
     def read(self, size: int) -> bytes:
-        """Return so many bytes, fewer only where it ends; those that never come take no memory."""
+        """Return the next `size` bytes, fewer at the end; those that never come take no memory."""
         pieces, self._seen = [self._seen[:size]], self._seen[size:]
         left = size - len(pieces[0])
         while left and (piece := self._some(min(left, _PIECE))):
@@ -203,12 +203,10 @@ class _Picture:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all planes."""
         each = 2 if self.bits > 8 else 1
         return sum(rows * columns * each for rows, columns in self.shapes)
 
     def frame(self, data: bytes, label: str) -> Frame:
-        """Return the pixels of a frame."""
         numbers = np.frombuffer(data, "<u2" if self.bits > 8 else "u1")
         planes, at = [], 0
         for rows, columns in self.shapes:

@@ -187,7 +187,6 @@ class Unit:
 
     @property
     def ns(self) -> int:
-        """The unit [ns]."""
         return UNITS[self.name]
 
 

@@ -321,5 +321,4 @@ def _end_of_gif(data: bytes) -> Iterator[str]:
 
 
 def _colours(flags: int) -> int:
-    """Return the bytes of a table of colours."""
     return 3 << ((flags & 7) + 1) if flags & 0x80 else 0

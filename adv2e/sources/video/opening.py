@@ -73,7 +73,6 @@ def opened(path: str, track: str | None = None) -> Iterator[Video]:
 
     Parameters
     ----------
-    path : str
     track : str, optional
         Number of the wanted track among those of video, from 0, or its language or title; default:
         the one that players take, which is flagged as default.
