@@ -7,7 +7,7 @@ Errors and doubts are worded for the command line, below which most of them aris
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import wraps
 from inspect import isgenerator
 from typing import Any, TypeVar
@@ -28,14 +28,18 @@ _OPTION = re.compile(
 )
 
 
-def in_python(text: str) -> str:
-    """Return a message with arguments in the place of options: ``--fps F`` becomes ``fps=F``."""
+def in_python(text: str, names: Mapping[str, str] | None = None) -> str:
+    """Return a message with arguments in the place of options: ``--fps F`` becomes ``fps=F``.
+
+    `names` are the arguments of a function by its options, where both differ: ``window`` is
+    ``window_s`` or ``window_us``.
+    """
+    names = {**_OTHER_NAMES, **(names or {})}
 
     def argument(found: re.Match[str]) -> str:
         if found[1] is None:
             return "output" if found[0] == "-o OUT" else found[0]
-        name = found[1].replace("-", "_")
-        name = _OTHER_NAMES.get(name, name)
+        name = names.get(found[1], found[1].replace("-", "_"))
         value = "True" if name in _FLAGS else found[2]
         if value is None:
             return name
@@ -46,13 +50,14 @@ def in_python(text: str) -> str:
 
 def reworded(function: Function) -> Function:
     """Return a function whose errors, and problems of what it returns, name arguments."""
+    names = getattr(function, "names", None)
 
     @wraps(function)
     def call(*arguments: Any, **named: Any) -> Any:
         try:
             found = function(*arguments, **named)
         except Adv2eError as error:
-            error.args = (in_python(str(error)),)
+            error.args = (in_python(str(error), names),)
             raise
         problems = getattr(found, "problems", None)
         if isinstance(problems, list):

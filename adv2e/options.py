@@ -19,6 +19,7 @@ import re
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from numbers import Real
 from typing import (
     TYPE_CHECKING,
@@ -71,9 +72,10 @@ def _number(what: str, fits: Callable[[Any], bool]) -> Callable[[Any], Any]:
     """Return a check of numbers that are finite and fit, which `what` says in words."""
 
     def checked(value: Any) -> Any:
-        if not (isinstance(value, Real) and math.isfinite(value) and fits(value)):
+        plain = isinstance(value, (int, float))
+        if not (isinstance(value, (Real, Decimal)) and math.isfinite(value) and fits(value)):
             raise ValueError(f"must be {what}, got {value!r}")
-        return value
+        return value if plain else float(value)
 
     return checked
 
@@ -87,7 +89,7 @@ def _count(value: int) -> int:
 _CHECKS: dict[str, Callable[[Any], Any]] = {
     "size": parse_size,
     "rectangle": parse_rectangle,
-    "seconds": _number("seconds from the first frame", lambda value: value >= 0),
+    "seconds": _number("seconds from the beginning, 0 or more", lambda value: value >= 0),
     "positive": _number("a number above 0", lambda value: value > 0),
     "share": _number(f"a share from 0 to {MOST_SHARE}", lambda value: 0 <= value <= MOST_SHARE),
     "time": _count,
@@ -619,9 +621,9 @@ class RenderOptions(RenderedPart, EventInput, total=False):
 WindowUs = Annotated[
     "int | None",
     Option(
-        help="Cut the events into windows of TIME, such as 33ms. For ev-segnet: the time before"
-        " each image.",
-        usual="ev-segnet: 50ms; voxel in a batch: from image to image",
+        help="Cut the events into windows of TIME, such as 33ms: of voxel grids; of pictures for"
+        " ev-segnet the time before each image.",
+        usual="ev-segnet: 50ms; voxel of 'adv2e batch': from image to image",
         flags=("--window",),
         kind="time",
         metavar="TIME",
@@ -632,7 +634,11 @@ WindowUs = Annotated[
 Bins = Annotated[
     int,
     Option(
-        help="Temporal bins of a voxel grid.", default=5, kind="count", most=10_000, metavar="N"
+        help="Temporal bins of a voxel grid (voxel).",
+        default=5,
+        kind="count",
+        most=10_000,
+        metavar="N",
     ),
 ]
 
@@ -852,6 +858,7 @@ def takes(*groups: Any) -> Callable[[Function], Function]:
 
         made: Any = call
         made.option_groups = groups
+        made.names = {option.flag_of(name).strip("-"): name for name, option in known.items()}
         return made  # type: ignore[no-any-return]
 
     return decorate

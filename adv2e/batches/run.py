@@ -405,6 +405,7 @@ def open_batch(
 def _export(options: BatchOptions, format: Format) -> Export | None:
     """Return the settings of --export, None without; UsageError if other options do not fit it."""
     kind, window_us, bins = options["export"], options["window_us"], options["bins"]
+    bins = Export.bins if bins is None else bins
     if window_us is not None and kind not in ("voxel", "ev-segnet"):
         raise UsageError("--window is for --export voxel and --export ev-segnet")
     if bins != Export.bins and kind != "voxel":

@@ -16,7 +16,7 @@ _GROUPS = {
         *("fps", "timestamps", "time_unit", "track", "start", "stop", "start_s", "stop_s", "crop"),
         *("rotate180", "bayer", "pixel_format", "allow_damaged", "take"),
         *("set_back", "crop_events"),
-        *("frames_path", "light"),
+        "light",
     ),
     "Sensor and pixel": (
         *("config_files", "sets", "seed", "effect_files", "size", "motion", "extent_px"),
@@ -52,9 +52,12 @@ class Command(click.Command):
         if len(records) < _MANY:
             super().format_options(ctx, formatter)
             return
-        grouped = {name for names in _GROUPS.values() for name in names} | {*_LAST}
+        # of `compare`; that of `render` is a flag of its output
+        takes_frames = any(item.name == "frames" and item.metavar for item in self.params)
+        groups = {**_GROUPS, "Input": (*_GROUPS["Input"], *["frames"] * takes_frames)}
+        grouped = {name for names in groups.values() for name in names} | {*_LAST}
         others = tuple(str(name) for name in records if name not in grouped)
-        groups = {"Options": others, **_GROUPS}
+        groups = {"Options": others, **groups}
         groups["Running"] = (*_GROUPS["Running"], *_LAST)
         for title, names in groups.items():
             if rows := [records[name] for name in names if name in records]:

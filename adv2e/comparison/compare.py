@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,7 @@ from adv2e.formats.recording import Recording
 from adv2e.in_python import in_python
 from adv2e.light.sensor import check_beside
 from adv2e.options import CompareOptions, EventInput, chosen, takes
+from adv2e.sources import PICTURES, VIDEO_SUFFIXES
 from adv2e.sources.times.rates import seconds
 
 if TYPE_CHECKING:
@@ -200,6 +202,7 @@ def compare(
     >>> found["measures"]["relative_5_bins"]["value"] < 0.5
     True
     """
+    read = [not isinstance(one, Recording) for one in (measured, simulated)]
     measured, simulated, source = _opened(measured, simulated, options, reading)
     for line in source.doubts if source else ():
         doubt(line)
@@ -222,7 +225,7 @@ def compare(
         simulate_events, seeds = again
         one, other = map(simulate_events, seeds)
         floors["two_seeds"] = distances(one, other, windows, *size, whole=measured.events).values
-    for stream in (measured, simulated):
+    for stream in compress((measured, simulated), read):
         for problem in stream.problems:
             doubt(f"{stream.path}: {problem}")
     return {
@@ -253,7 +256,10 @@ def _opened(
     """Return both streams, and the frames from elsewhere if there are any."""
     given, frames = chosen(EventInput, options), options["frames"]
     whole: EventInput = {"rotate180": False, "track": None, "start_s": None, "stop_s": None}
-    of_frames: Any = {name: given[name] for name in ("rotate180", "time_unit", "crop")}
+    # of the frames, lists and files of events have times in a unit; a video has its own
+    has_own = frames is not None and Path(frames).suffix.lower() in (*VIDEO_SUFFIXES, *PICTURES)
+    names = ("rotate180", "crop") if has_own else ("rotate180", "crop", "time_unit")
+    of_frames: Any = {name: value for name, value in given.items() if name in names}
     of_files = {
         *(() if isinstance(measured, Recording) else given),
         *(() if isinstance(simulated, Recording) else given.keys() - whole.keys()),

@@ -140,7 +140,11 @@ def _bases() -> list[Path]:
 
 def _code(folder: Path) -> dict[str, Path]:
     """Return each file of code, by its name below `folder`."""
-    return {path.relative_to(folder).as_posix(): path for path in sorted(folder.rglob("*.nb?"))}
+    return {
+        path.relative_to(folder).as_posix(): path
+        for path in sorted(folder.glob("*/**/*"))
+        if path.is_file()
+    }
 
 
 def _digest(path: Path) -> str:

@@ -152,12 +152,17 @@ def read_events(
     return recording
 
 
-def shots_of(file: EventFile) -> Iterator[Shot]:
-    """Yield the frames of the part that is wanted, turned and cut, in the order of time."""
+def shots_of(file: EventFile, shots: Iterable[Shot] | None = None) -> Iterator[Shot]:
+    """Yield the frames of the part that is wanted, turned and cut, in the order of time.
+
+    `shots` are all frames, where they were listed before.
+    """
     begin_us, end_us = _wanted_us(file)
     with _reading(file.facts.path):
-        for shot in () if file.shots is None else file.shots():
-            if begin_us <= shot.t_ns / 1000 <= end_us:
+        if shots is None:
+            shots = () if file.shots is None else file.shots()
+        for shot in shots:
+            if begin_us <= microseconds(shot.t_ns) <= end_us:
                 yield replace(shot, load=partial(_loaded, file.facts, shot))
 
 
@@ -460,11 +465,14 @@ def assemble(file: EventFile) -> Recording:
         facts.tell(f"times begin below zero, at {events['t'][0] / 1e6:.6f} s")
     if count := repeated(events):
         facts.tell(f"{count} events repeat another one exactly: kept")
+    shots = None
     if file.shots is not None:
-        facts.problems += _disagreement(events, _times_ns(file.shots()))
+        with _reading(facts.path):
+            shots = list(file.shots())  # once: it may take as long as the events
+        facts.problems += _disagreement(events, _times_ns(shots))
+        shots = list(shots_of(file, shots))
     size = _size_wanted(file, size)
-    events = next(_wanted(file, [events]), events[:0])
-    shots = None if file.shots is None else list(shots_of(file))
+    events = next(_wanted(file, [events]), np.empty(0, events.dtype))
     return Recording(
         path=str(facts.path),
         layout=file.layout,
@@ -556,10 +564,11 @@ def _wanted(file: EventFile, parts: Iterable[Events]) -> Generator[Events, None,
             some = inside(some, (width, height))
         elif some.size < events.size:
             some = some.copy()  # without the rest in memory
+        ends = bool(times.size and times[-1] > end_us)  # now: who takes them may change them
         if some.size:
             found = True
             yield some
-        if times.size and times[-1] > end_us:
+        if ends:
             break
     if not found and (wanted.is_timed or wanted.crop) and next(shots_of(file), None) is None:
         first_us, last_us = _span_us(file)

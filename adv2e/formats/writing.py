@@ -249,7 +249,7 @@ class Pieces:
                 yield self.take()
 
     def take(self) -> NDArray[Any]:
-        """Return what is held, less than a piece, which nobody writes to any more."""
+        """Return the items that are held; nobody writes to them any more."""
         held = self._buffer[: self._held]
         self._buffer, self._held = np.empty_like(self._buffer), 0
         return held

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 
+import cv2
 import numpy as np
 import pytest
 
@@ -150,6 +151,20 @@ def test_the_unit_of_times_is_that_of_frames_from_elsewhere_too(adv2e, write, tm
     (tmp_path / "frames.timestamps.txt").write_text("".join(f"{20 * n}\n" for n in range(6)))
     frames = ("--frames", tmp_path / "frames.npy", "--time-unit", "ms")
     report = json.loads(adv2e("compare", measured, simulated, *frames, "--json").out)
+    assert report["windows"]["edges_us"] == [20_000, 40_000, 60_000, 80_000]
+
+
+def test_a_video_beside_events_has_times_of_its_own(adv2e, tmp_path):
+    video = tmp_path / "film.avi"
+    writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 50, (WIDTH, HEIGHT))
+    for _ in range(6):
+        writer.write(np.zeros((HEIGHT, WIDTH, 3), np.uint8))
+    writer.release()
+    for name, seed in (("real.txt", 1), ("made.txt", 2)):
+        rows = [f"{t * 1000} {x} {y} {p}" for t, x, y, p in some_events(seed).tolist()]
+        (tmp_path / name).write_text("\n".join(rows) + "\n")
+    words = ("--frames", video, "--time-unit", "ns", "--size", f"{WIDTH}x{HEIGHT}", "--json")
+    report = json.loads(adv2e("compare", tmp_path / "real.txt", tmp_path / "made.txt", *words).out)
     assert report["windows"]["edges_us"] == [20_000, 40_000, 60_000, 80_000]
 
 

@@ -10,7 +10,11 @@ from streams import random_events
 
 import adv2e as package
 from adv2e.errors import DataError, UsageError
+from adv2e.formats import hdf5
+from adv2e.formats.event_file import EventFile, Facts
+from adv2e.formats.reading import assemble
 from adv2e.formats.writing import open_sink
+from adv2e.sources.frame import Shot
 
 SIZE = WIDTH, HEIGHT = 12, 9
 EVENTS = np.unique(random_events(1, 4000, first=1_000_000, last=2_000_000, size=SIZE))
@@ -54,6 +58,32 @@ def test_events_and_frames_are_cut_alike(name):
     assert part.frame_times_ns.tolist() == TIMES_NS[inside].tolist()
     for frame, whole in zip(part.frames(), FRAMES[inside], strict=True):
         assert np.array_equal(frame.image, whole[1:7, 2:10])
+
+
+def test_a_file_read_in_several_pieces_ends_where_it_is_told_to(adv2e, monkeypatch):
+    """Also where its times begin below zero, and are moved while it is read."""
+    monkeypatch.setattr(hdf5, "PART", 500)
+    events = EVENTS.copy()
+    events["t"] -= FIRST + 400_000
+    words = ("--from", "events", "--t0", "zero", "--stop", "0.6")
+    assert adv2e("convert", written(events=events), "-o", "b.h5", *words).status == 0
+    assert package.read_events("b.h5").events["t"].tolist() == [
+        t - FIRST for t in EVENTS["t"].tolist() if t <= FIRST + 600_000
+    ]
+
+
+def test_frames_are_listed_once():
+    """A list may take as long as the events: that of a bag reads every message."""
+    listed = []
+    facts = Facts(Path("a.bag"))
+    facts.state(SIZE, "the test")
+    columns = tuple(EVENTS[name] for name in "txyp")
+    shots = [Shot(int(t_ns), "a frame", lambda: None) for t_ns in TIMES_NS]
+    file = EventFile(
+        "bag", facts, lambda: iter([columns]), shots=lambda: listed.append(1) or iter(shots)
+    )
+    assert len(assemble(file).frame_times_ns) == len(shots)
+    assert len(listed) == 1
 
 
 @pytest.mark.filterwarnings("ignore:.*which size states. left out")

@@ -1,12 +1,13 @@
 """Frame coupling: the readout of a frame disturbs the event pixels of the same sensor.
 
     d(t) = A sum over frames of (l(t - t_f) - l(t - t_f - w))
-    l(s) = exp(-s/tau) for s > 0, else 0
+    l(s) = 0 for s < 0, s/r for 0 <= s < r, exp(-(s - r)/tau) from there on
 
 d           disturbance, added to the signal of all pixels behind all poles
 A           amplitude [ln]
 tau         tau_us
 w           width_us: the signal leaps back so long after it leapt; with 0 it only decays
+r           rise_us; if that is 0, a twelfth of tau, or of w where that is shorter
 t_f         time at which a frame was read out: the end of its exposure, and delay_us more, or less
             if that is below 0
 
@@ -21,12 +22,12 @@ When a DAVIS240C watches a scene in motion, these are a tenth of all events: ON 
 each frame, OFF in about a millisecond after it.
 
 The pixels are at rest at the first frame: there is no leap before it, but with period_us, those
-before have gone on, and what is left of them is there from the beginning.  A leap is a rise over
-rise_us.  If that is 0, it is a rise over a twelfth of tau, or of w where that is shorter.  The rise
-is the longest step of time there.  Then it decays: nothing shows before the leap, and its height is
-met.  A line through a step of a twelfth of tau of the decay is off by A/1152.  Intervals that begin
-when no more than that is left, 7 tau after a leap has risen, take the steps that they would without
-it.
+before have gone on, and what is left of them is there from the beginning.  A rise is the longest
+step of time there: nothing shows before the leap, and its height is met.  A line through a step of
+a twelfth of tau of the decay is off by A/1152.  Intervals that begin when no more than that is
+left, 7 tau after a leap has risen, take the steps that they would without it.
+
+Added to the pixels in adv2e/pixel/steps.py and adv2e/kernel/stepped/signal.py.
 
 References
 ----------

@@ -27,7 +27,7 @@ class Alpha(Enum):
 
 
 def with_alpha(colours: Image, alpha: NDArray[Any], kind: Alpha, most: float, label: str) -> Frame:
-    """Return the pixels of an image with alpha of the data type of its grey or RGB colours.
+    """Return a frame of grey or RGB colours with alpha of their data type.
 
     `most` is the alpha of pixels that are all there, and white of whole numbers; `label` is the
     name of the file, for messages.

@@ -64,7 +64,7 @@ def check_size(width: int, height: int) -> None:
 
 
 def in_range(image: Image, bits: int, label: str) -> Frame:
-    """Return the pixels of an image of so many bits, lowest bits used; DataError if it has more."""
+    """Return an image of so many bits, lowest bits used, as a frame; DataError if it has more."""
     white, largest = (1 << bits) - 1, int(image.max())
     if largest > white:
         raise DataError(f"{label}: a number of {largest}, above the {white} of {bits} bits")
