@@ -94,10 +94,10 @@ def test_times_of_the_epoch_stay_exact(stack):
         ({"fps": 25, "timestamps": "t.txt"}, "--fps and --timestamps"),
         ({"fps": 0}, "--fps"),
         ({"fps": float("nan")}, "--fps"),
-        ({"fps": 25, "start_s": -1}, "--start"),
-        ({"fps": 25, "stop_s": float("nan")}, "--stop"),
+        ({"fps": 25, "start_s": -1}, "start_s: must be seconds"),
+        ({"fps": 25, "stop_s": float("nan")}, "stop_s: must be seconds"),
         ({"fps": 25, "start_s": 2, "stop_s": 2}, "--stop 2 must be after"),
-        ({"fps": 25, "t0": "now"}, "--t0"),
+        ({"fps": 25, "t0": "now"}, "t0: must be auto, zero or keep"),
     ],
 )
 def test_impossible_options_are_usage_errors(stack, options, message):
