@@ -18,11 +18,11 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1390,
+    "": 1400,
     "batches": 1350,
     "cli": 1300,
     "comparison": 710,
-    "compilation": 210,
+    "compilation": 220,
     "config": 1300,
     "conversion": 1180,
     "diagnosis": 6740,
