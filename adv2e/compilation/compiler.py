@@ -50,12 +50,13 @@ class _Finder(MetaPathFinder):
 
 def _import_numba() -> tuple[Any, Any, Any]:
     finder = _Finder()
-    sys.meta_path.insert(0, finder)
+    sys.meta_path = [finder, *sys.meta_path]
     try:
         names = "numba", "numba.core.event", "numba.extending"
         numba, event, extending = map(import_module, names)
     finally:
-        sys.meta_path.remove(finder)
+        # another thread may import meanwhile, and would miss a finder if its list became shorter
+        sys.meta_path = [one for one in sys.meta_path if one is not finder]
     return numba, event, extending.typeof_impl
 
 

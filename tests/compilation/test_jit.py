@@ -145,6 +145,29 @@ def test_whoever_watches_is_told_of_what_is_compiled_and_numba_stays_as_it_was(s
     assert said(start(code=WATCH)) == ["0"]
 
 
+FINDERS = """
+import sys
+seen = []
+class Looks:
+    def find_spec(self, name, path=None, target=None):
+        if name == "numba":
+            seen.append((sys.meta_path, list(sys.meta_path)))
+sys.meta_path.insert(0, Looks())
+before = list(sys.meta_path)
+from adv2e.inner import inner
+inner(1)
+(held, then), = seen
+print(held == then, [one in held for one in before], sys.meta_path == before)
+"""
+
+
+def test_imports_of_other_threads_miss_no_finder_while_numba_is_imported(start):
+    """A list that becomes shorter while an import goes through it makes that skip a finder."""
+    told = said(start(code=FINDERS))
+    assert told[0] == told[-1] == "True"
+    assert "False" not in "".join(told)
+
+
 SETTINGS = """
 from pathlib import Path
 from adv2e import compiled
