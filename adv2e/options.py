@@ -72,10 +72,10 @@ def _number(what: str, fits: Callable[[Any], bool]) -> Callable[[Any], Any]:
     """Return a check of numbers that are finite and fit, which `what` says in words."""
 
     def checked(value: Any) -> Any:
-        plain = isinstance(value, (int, float))
-        if not (isinstance(value, (Real, Decimal)) and math.isfinite(value) and fits(value)):
+        is_number = isinstance(value, (Real, Decimal))
+        if not (is_number and math.isfinite(value) and fits(value)):
             raise ValueError(f"must be {what}, got {value!r}")
-        return value if plain else float(value)
+        return value if isinstance(value, (int, float)) else float(value)
 
     return checked
 

@@ -62,6 +62,8 @@ class Style:
     def __post_init__(self) -> None:
         if self.name not in STYLES:
             raise UsageError(f"style '{self.name}': must be one of {', '.join(STYLES)}")
+        if self.window_us < 1:
+            raise UsageError(f"window {self.window_us} us: must be at least 1 us")
 
     @property
     def background(self) -> Colour:

@@ -79,6 +79,8 @@ def test_unknown_colours_name_the_known(text):
         parse_colour(text)
 
 
-def test_an_unknown_style_is_refused():
+def test_unknown_style_and_empty_window():
     with pytest.raises(UsageError, match="'pink': must be one of white, black, grey, surface"):
         Style(name="pink")
+    with pytest.raises(UsageError, match="at least 1 us"):
+        Style(window_us=0)
