@@ -1,6 +1,8 @@
 """Decorators for compiled functions: Numba compiles them, and keeps their code for later runs.
 
 A compiled function is a :func:`kernel`; an :func:`inlined` one becomes part of each of its callers.
+The compiler optimises all code below a function with that function, so what is called by one that
+is called by one is compiled three times: those near the top, with one caller, are inlined.
 Numba is imported when the first of them is called, as it takes as long as a small conversion:
 what computes nothing, such as ``adv2e info``, does without, and ``adv2e convert`` imports it
 while the input is opened (:func:`import_ahead`).
@@ -85,6 +87,8 @@ class Compiled:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it; it is compiled for each new kind of arguments."""
+        if "entry" not in self.__dict__:
+            return _with_room(self, arguments)
         return self.entry(*arguments)
 
     def __getattr__(self, name: str) -> Any:
@@ -104,6 +108,19 @@ class Compiled:
                     **self._options,
                 )
         return self.__dict__[name]
+
+
+def _with_room(function: Compiled, arguments: tuple[Any, ...]) -> Any:
+    """Call a function that may have to be compiled, with room on Python's stack.
+
+    Python takes memory for its stack in small chunks, and gives each back at once.  The compiler
+    goes back and forth over the border of one half a million times.
+    """
+    return function.entry(*arguments)
+
+
+# a frame this large gets a chunk of its own, of which the next frames have the rest, some 300 kB
+_with_room.__code__ = _with_room.__code__.replace(co_stacksize=90_000)
 
 
 def _compiler() -> Any:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import kernel
+from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel, screen, static_pixels
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.cascade import advance as cascade
@@ -131,7 +131,7 @@ def _close_strip(lo, count, piece, circuit, state, strip, noise):
         state[per_pixel.X, lo + k] = screen.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
 
 
-@kernel
+@inlined
 def _screen(strip, end, length, circuit, rule):
     screen.screen(
         strip, end, _f(circuit.dark * length), _f(circuit.per_dn * length),
@@ -152,7 +152,7 @@ def _solve_flagged(lo, m, interval, circuit, rule, state, memory, buffer, n):
         n, waiting = batch.search(lo, m, interval, circuit, rule, state, memory, buffer, n)
 
 
-@kernel
+@inlined
 def _advance_strip(lo, count, interval, circuit, rule, state, memory, buffer, n):
     """Advance one strip over one interval, whose light is in LIGHT_0 and LIGHT_1."""
     strip, length = memory.rows, interval.length
@@ -169,7 +169,7 @@ def _advance_strip(lo, count, interval, circuit, rule, state, memory, buffer, n)
     return n, buffer
 
 
-@kernel
+@inlined
 def _rule(rules, f):
     """Return the quadrature of interval f."""
     count, dead = rules.counts[f], rules.counts_dead[f]
@@ -179,7 +179,7 @@ def _rule(rules, f):
     )  # fmt: skip
 
 
-@kernel
+@inlined
 def _strip(lo, count, schedule, circuit, rules, plan, state, memory, buffer, n):
     """Advance one strip of the exact circuit over all intervals."""
     schedule, all_rules, state, memory = borrowed(schedule, rules, state, memory)

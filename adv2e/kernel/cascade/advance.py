@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import kernel
+from adv2e.compiled import inlined, kernel
 from adv2e.kernel import screen, special
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.cascade import pixel as alone
@@ -78,7 +78,7 @@ def _solve_alone(lo, m, piece, circuit, state, memory, buffer, n):
     return n, buffer
 
 
-@kernel
+@inlined
 def _solve_beside_noise(lo, number, which, piece, circuit, laws, state, memory, buffer, n):
     """Solve the flagged pixels of a strip over piece `number` of all, which has law `which`."""
     strip, pixels, own = memory.strip.rows, memory.strip.pixels, memory.cascade
@@ -102,7 +102,7 @@ def _solve_beside_noise(lo, number, which, piece, circuit, laws, state, memory, 
     return n, buffer
 
 
-@kernel
+@inlined
 def advance(lo, count, interval, number, still, circuit, plan, state, memory, buffer, n):
     """Advance one strip over an interval, piece by piece; `still`: nothing moves or lags in it.
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import kernel
+from adv2e.compiled import inlined, kernel
 from adv2e.kernel import per_pixel, rng
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.comparator import with_room
@@ -261,7 +261,7 @@ def _fire_gathered(c, count, lo, step, circuit, run, injected, state, memory, bu
     return c, number
 
 
-@kernel
+@inlined
 def _fire_step(lo, n, step, circuit, run, injected, state, memory, buffer, number):
     """Fire the events of a step of a run."""
     c, count = np.int64(0), events.gather(n, memory.strip, memory.pixels)
@@ -273,7 +273,7 @@ def _fire_step(lo, n, step, circuit, run, injected, state, memory, buffer, numbe
     return number, buffer
 
 
-@kernel
+@inlined
 def _strip(lo, count, schedule, circuit, run, injected, state, memory, buffer, number):
     """Advance one strip over a run."""
     schedule, run, injected, state = borrowed(schedule, run, injected, state)
