@@ -29,7 +29,7 @@ LIMITS = {
     "effects": 1530,
     "exporting": 470,
     "files": 780,
-    "formats": 5040,
+    "formats": 5055,
     "inspection": 260,
     "kernel": 4840,
     "light": 870,

@@ -248,9 +248,12 @@ class Pieces:
 
     def add(self, items: NDArray[Any]) -> Iterator[NDArray[Any]]:
         """Take items, and yield the pieces that are full."""
+        items = np.ascontiguousarray(items, self._buffer.dtype)
         while items.size:
             part, items = np.split(items, [self._buffer.size - self._held])
-            self._buffer[self._held : self._held + part.size] = part
+            # as bytes: records would be copied field by field
+            target = self._buffer[self._held : self._held + part.size]
+            target.view(np.uint8)[:] = part.view(np.uint8)
             self._held += part.size
             if self._held == self._buffer.size:
                 yield self.take()
