@@ -31,7 +31,7 @@ LIMITS = {
     "files": 780,
     "formats": 5055,
     "inspection": 260,
-    "kernel": 4970,
+    "kernel": 4995,
     "light": 870,
     "motion": 350,
     "pixel": 575,

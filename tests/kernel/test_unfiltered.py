@@ -33,6 +33,8 @@ def frames():
     stack = 100 + 95 * np.sin(phases) * np.cos(0.2 * y) + draw.normal(0, 3, phases.shape)
     stack[6:12, :, COLUMNS // 2 :] = stack[6, :, COLUMNS // 2 :]  # rests for a while
     stack[15, :4] = 0.0
+    stack[18:] = stack[17]  # returns to where it was, a whole number of thresholds away
+    stack[[19, 22]] = stack[2]
     return np.clip(np.rint(stack), 0, 255).astype(np.uint8)
 
 
@@ -52,15 +54,16 @@ def circuits(monkeypatch):
 
 def events_of(frames, case, **options):
     config = ["ideal", {"frames": {"encoding": "srgb"}, **CASES[case]}]
-    return np.concatenate(list(simulate(frames, fps=240, config=config, causes=True, **options)))
+    return np.concatenate(list(simulate(frames, fps=240, config=config, **options)))
 
 
+@pytest.mark.parametrize("causes", [False, True])
 @pytest.mark.parametrize("case", CASES)
-def test_events_are_those_of_the_stepped_solver(circuits, frames, case):
+def test_events_are_those_of_the_stepped_solver(circuits, frames, case, causes):
     nothing = effect((ROWS, COLUMNS), signal=lambda t: 0.0 * t)
-    found = events_of(frames, case)
+    found = events_of(frames, case, causes=causes)
     assert circuits == [True]
-    stepped = events_of(frames, case, effects=[nothing])
+    stepped = events_of(frames, case, causes=causes, effects=[nothing])
     assert circuits == [True]  # with an effect inside the pixel nobody asks
     assert found.size > 20_000
     np.testing.assert_array_equal(found, stepped)
