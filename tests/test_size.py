@@ -29,12 +29,12 @@ LIMITS = {
     "effects": 1530,
     "exporting": 470,
     "files": 780,
-    "formats": 5020,
+    "formats": 5055,
     "inspection": 260,
-    "kernel": 4840,
+    "kernel": 4995,
     "light": 870,
     "motion": 350,
-    "pixel": 570,
+    "pixel": 575,
     "process": 260,
     "rendering": 740,
     "reports": 1710,
@@ -44,7 +44,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 306
+FILES = 307
 """Most modules of all packages together."""
 
 _SLACK = 60

@@ -13,11 +13,12 @@ import numpy as np
 FORMS = {
     "lanes": ["sampling.interpolation=flow"],
     "steps": ["pixel.low_pass.update=paper"],
+    "lines": ["pixel.low_pass=null"],
     "cascade": ["pixel.source_follower.cutoff_hz=900", "pixel.photoreceptor_noise.rms=0.03"],
 }
 """Options that need each of the pixel's solvers, and all else that is compiled and takes long."""
 
-SHARES = (("lanes", "steps"), ("cascade",))
+SHARES = (("lanes", "steps"), ("cascade", "lines"))
 """Forms that one process compiles: each share takes about as long."""
 
 

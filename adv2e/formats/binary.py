@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.background import OrderedWork
 from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.formats.event_file import Column, Columns, EventFile, Facts, described_geometry
@@ -561,7 +562,7 @@ _KINDS_2 = (0x0, 0x1, _HIGH, 0xA, 0xE, 0xF)
 _LOW_BITS, _ADDRESS_BITS = 6, 11  # of words of EVT 2.0
 _UPPER = {"little": 1, "legacy": 0}  # place of the upper half of a word
 _READ = 1 << 19  # bytes
-_WRITTEN = 1 << 16, 1 << 18  # events written at once, in EVT 2.0 and EVT 3.0
+_WRITTEN = 1 << 16  # events, or high bits of times, written at once
 _VERSIONS = {"2.0": "EVT2", "2.1": "EVT21", "3.0": "EVT3", "4.0": "EVT4"}
 
 
@@ -822,8 +823,8 @@ class Evt2Writer(Writer):
 
     def write_events(self, events: Events) -> None:
         """Append events."""
-        for begin in range(0, events.size, _WRITTEN[0]):
-            part = events[begin : begin + _WRITTEN[0]]
+        for begin in range(0, events.size, _WRITTEN):
+            part = events[begin : begin + _WRITTEN]
             t = np.ascontiguousarray(part["t"])
             words = part["p"].astype("<u4")
             for bits, value in (
@@ -840,58 +841,68 @@ class Evt2Writer(Writer):
 
 
 class Evt3Writer(Writer):
-    """Writes EVT 3.0; see :class:`Writer`."""
+    """Writes EVT 3.0, encoded in threads; see :class:`Writer`."""
 
     def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._file = stack.enter_context(path.open("wb"))
         self._file.write(raw_header(request, "3.0"))
-        self._high = self._low = self._row = -1
+        self._work = OrderedWork(request.threads - 1)
+        stack.callback(self._work.abandon)
+        self._state = -1, -1, -1  # high and low bits of the time, row
 
     def write_events(self, events: Events) -> None:
         """Append events."""
-        for begin in range(0, events.size, _WRITTEN[1]):
-            part = events[begin : begin + _WRITTEN[1]]
-            far = np.flatnonzero(np.diff(part["t"] >> 12) > _WRITTEN[1]) + 1
+        for begin in range(0, events.size, _WRITTEN):
+            part = events[begin : begin + _WRITTEN]
+            far = np.flatnonzero(np.diff(part["t"] >> 12) > _WRITTEN) + 1
             for piece in np.split(part, far):
                 self._pass_time(int(piece["t"][0] >> 12))
-                self._write(piece)
+                self._work.submit(_evt3_words, piece, self._state, take=self._file.write)
+                t = int(piece["t"][-1])
+                self._state = t >> 12, t & 0xFFF, int(piece["y"][-1])
 
     def finish(self) -> None:
-        """Write the time at which nothing happened, where there was no event."""
+        """Write the remaining events, or the time at which nothing happened if there are none."""
         self._pass_time(0)
+        self._work.finish()
 
     def _pass_time(self, high: int) -> None:
         """Write the high bits of all times up to one."""
-        while self._high < high:
-            highs = np.arange(self._high + 1, min(self._high + _WRITTEN[1], high) + 1)
-            self._file.write((highs & 0xFFF | _HIGH << 12).astype("<u2").data)
-            self._high, self._low = int(highs[-1]), -1
+        while self._state[0] < high:
+            begin, end = self._state[0] + 1, min(self._state[0] + _WRITTEN, high)
+            self._work.submit(_evt3_highs, begin, end, take=self._file.write)
+            self._state = end, -1, self._state[2]
 
-    def _write(self, events: Events) -> None:
-        """Append events; the time before the first of them has passed."""
-        high, low, row = events["t"] >> 12, (events["t"] & 0xFFF).astype(np.int32), events["y"]
-        passed = np.diff(high, prepend=self._high)
-        new_low = np.empty(events.size, np.bool_)
-        new_low[0] = low[0] != self._low
-        new_low[1:] = (low[1:] != low[:-1]) | (passed[1:] > 0)
-        new_row = np.empty(events.size, np.bool_)
-        new_row[0] = row[0] != self._row
-        np.not_equal(row[1:], row[:-1], out=new_row[1:])
-        self._high, self._low, self._row = int(high[-1]), int(low[-1]), int(row[-1])
 
-        place = np.cumsum(passed + new_low + new_row + 1) - 1  # of each event's last word
-        words = np.empty(int(place[-1]) + 1, "<u2")
-        words[place] = _COLUMN << 12 | events["p"].astype(np.uint16) << 11 | events["x"]
-        words[place[new_row] - 1] = _ROW << 12 | row[new_row]
-        words[(place - new_row)[new_low] - 1] = _LOW << 12 | low[new_low]
-        steps = np.flatnonzero(passed)
-        count = passed[steps]
-        # the last HIGH before an event stands before its LOW, which a new HIGH always has
-        last = (place - new_row)[steps] - 2
-        back = np.repeat(np.cumsum(count), count) - 1 - np.arange(int(count.sum()))
-        highs = np.repeat(high[steps], count) - back
-        words[np.repeat(last, count) - back] = _HIGH << 12 | highs & 0xFFF
-        self._file.write(words.data)
+def _evt3_highs(begin: int, end: int) -> memoryview:
+    """Return the words of the high bits of the times from `begin` to `end`."""
+    return (np.arange(begin, end + 1) & 0xFFF | _HIGH << 12).astype("<u2").data
+
+
+def _evt3_words(events: Events, state: tuple[int, int, int]) -> memoryview:
+    """Return the words of events, after those that left high and low bits and row as in `state`."""
+    high, low, row = events["t"] >> 12, (events["t"] & 0xFFF).astype(np.int32), events["y"]
+    passed = np.diff(high, prepend=state[0])
+    new_low = np.empty(events.size, np.bool_)
+    new_low[0] = low[0] != state[1]
+    new_low[1:] = (low[1:] != low[:-1]) | (passed[1:] > 0)
+    new_row = np.empty(events.size, np.bool_)
+    new_row[0] = row[0] != state[2]
+    np.not_equal(row[1:], row[:-1], out=new_row[1:])
+
+    place = np.cumsum(passed + new_low + new_row + 1) - 1  # of each event's last word
+    words = np.empty(int(place[-1]) + 1, "<u2")
+    words[place] = _COLUMN << 12 | events["p"].astype(np.uint16) << 11 | events["x"]
+    words[place[new_row] - 1] = _ROW << 12 | row[new_row]
+    words[(place - new_row)[new_low] - 1] = _LOW << 12 | low[new_low]
+    steps = np.flatnonzero(passed)
+    count = passed[steps]
+    # the last HIGH before an event stands before its LOW, which a new HIGH always has
+    last = (place - new_row)[steps] - 2
+    back = np.repeat(np.cumsum(count), count) - 1 - np.arange(int(count.sum()))
+    highs = np.repeat(high[steps], count) - back
+    words[np.repeat(last, count) - back] = _HIGH << 12 | highs & 0xFFF
+    return words.data
 
 
 # ---- Events of the data sets N-MNIST and N-Caltech101, in files that end on ``.bin``.

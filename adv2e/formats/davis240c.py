@@ -50,7 +50,7 @@ from adv2e.files.staging import Staging
 from adv2e.files.zips import Members
 from adv2e.formats.event_file import EventFile, Facts
 from adv2e.formats.text import lines_of
-from adv2e.formats.text_writer import text_blocks
+from adv2e.formats.text_writer import blocks_of, formatted, text_blocks
 from adv2e.formats.writing import Request, Writer, to_json
 from adv2e.sources.frame import Frame, Shot
 from adv2e.sources.images.opencv import decode_image
@@ -177,8 +177,8 @@ class FolderWriter(_Davis240cWriter):
 
     def write_events(self, events: Events) -> None:
         """Append events."""
-        for block in text_blocks(events):
-            self._events.write(block)
+        for block in blocks_of(events):
+            self._work.submit(formatted, block, take=self._events.write)
 
     def _store_frame(self, name: str, t_ns: int, image: NDArray[Any]) -> None:
         self._work.submit(_png, image, take=(self._folder / name).write_bytes)

@@ -206,14 +206,15 @@ class Hdf5Writer(Writer):
     def chunk_made(self, begin: int, events: Events) -> None:
         """Take note of a chunk, `begin` events after the first."""
         self.on += int(np.count_nonzero(events["p"]))
-        times = events["t"] / 1e6
+        last = events["t"][-1] / 1e6
         for t_ns, _ in self.frames[len(self._before) :]:
             t = t_ns / 1e9
-            if t > times[-1]:
+            if t > last:
                 break
             came_late = self._ends and t <= self._ends[-1]
-            self._before.append(None if came_late else begin + int(np.searchsorted(times, t)))
-        self._ends.append(times[-1])
+            within = 0 if came_late else int(np.searchsorted(events["t"] / 1e6, t))
+            self._before.append(None if came_late else begin + within)
+        self._ends.append(last)
         if self._index is not None:
             self._index.add(begin, self.times_us(events))
 

@@ -21,12 +21,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.background import OrderedWork
 from adv2e.compiled import kernel
 from adv2e.events import EVENT_DTYPE, Events
 from adv2e.files.staging import Staging
 from adv2e.formats.writing import Request, Writer
 
-_BLOCK = 1 << 15  # events formatted at once
+_BLOCK = 1 << 14  # events formatted at once
 _LONGEST = 48  # bytes of the longest line, and what the kernel may write beyond its end
 
 
@@ -103,30 +104,44 @@ def _tables() -> tuple[NDArray[np.uint8], NDArray[np.int64], NDArray[np.uint8]]:
     )
 
 
-def text_blocks(events: Events) -> Iterator[memoryview]:
-    """Yield the lines of `events` as bytes; each block is valid until the next is asked for."""
+def formatted(events: Events) -> memoryview:
+    """Return the lines of `events`, a block of them, as bytes."""
     events = np.require(events, EVENT_DTYPE, ["C", "W"])  # one type for the compiled code
     numbers, lengths, triples = _tables()
-    prefix = np.empty(24, np.uint8)
-    out = np.empty(min(_BLOCK, events.size) * _LONGEST, np.uint8)
+    out = np.empty(events.size * _LONGEST, np.uint8)
+    columns = events["t"], events["x"], events["y"], events["p"]
+    size = format_lines(*columns, numbers, lengths, triples, np.empty(24, np.uint8), out)
+    return out[:size].data
+
+
+def blocks_of(events: Events) -> Iterator[Events]:
+    """Yield the events in blocks that are formatted at once."""
     for begin in range(0, events.size, _BLOCK):
-        part = events[begin : begin + _BLOCK]
-        columns = part["t"], part["x"], part["y"], part["p"]
-        size = format_lines(*columns, numbers, lengths, triples, prefix, out)
-        yield out[:size].data
+        yield events[begin : begin + _BLOCK]
+
+
+def text_blocks(events: Events) -> Iterator[memoryview]:
+    """Yield the lines of `events` as bytes, block by block."""
+    return map(formatted, blocks_of(events))
 
 
 class TextWriter(Writer):
-    """Writes a text file of events."""
+    """Writes a text file of events, which is formatted in threads."""
 
     def __init__(self, request: Request, stack: ExitStack, *temporary: Path) -> None:
         (text,) = temporary
         self._file = stack.enter_context(text.open("wb"))
+        self._work = OrderedWork(request.threads - 1)
+        stack.callback(self._work.abandon)
 
     def write_events(self, events: Events) -> None:
         """Append events."""
-        for block in text_blocks(events):
-            self._file.write(block)
+        for block in blocks_of(events):
+            self._work.submit(formatted, block, take=self._file.write)
+
+    def finish(self) -> None:
+        """Write the remaining lines."""
+        self._work.finish()
 
 
 class StandardOutput(Writer):

@@ -1,13 +1,14 @@
 """The compiled part of the pixel: plain numbers and arrays in, events out.
 
-Two solvers, each a strip of pixels at a time through all intervals:
+Three solvers, each a strip of pixels at a time through all intervals:
 
 ``exact``           the exact circuit of one pole: ``screen`` takes all pixels to the end of an
                     interval and finds those that may fire, ``lanes`` solves these side by side,
                     and ``static_pixels`` a strip at rest in closed form
-``stepped``         everything else, in steps of time: the K-step forms, no low-pass, the last
-                    interval as printed, second pole, noise, slew limit, overshoot, drift, and what
-                    acts on the pixels from outside
+``unfiltered``      no filter, leak or noise of the photoreceptor: the next frame shows which
+                    pixels may fire, and these go through the instants before it
+``stepped``         everything else, in steps of time: the K-step forms, no low-pass but leak, the
+                    last interval as printed, slew limit, and what acts on the pixels from outside
 
 and what they share:
 

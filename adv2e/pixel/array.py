@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
 from typing import Any
@@ -19,7 +19,7 @@ from adv2e.effects.hooks import LONGEST_US, Hooks
 from adv2e.effects.pixel.threshold_drift import drift_factors
 from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE, Events
-from adv2e.kernel import exact
+from adv2e.kernel import exact, unfiltered
 from adv2e.kernel import packing as order
 from adv2e.kernel.cascade.plan import plan_for
 from adv2e.kernel.comparator import EventBuffer
@@ -32,7 +32,7 @@ from adv2e.kernel.work_queue import STRIP, nothing_claimed
 from adv2e.light.intervals import Part
 from adv2e.pixel.merge import Parted, in_order, polarity_bits
 from adv2e.pixel.state import driver_of, initial_state, make_circuit
-from adv2e.pixel.steps import PRECISE, Coarseness, Stepping
+from adv2e.pixel.steps import NOTHING, PRECISE, Coarseness, Stepping
 
 _LARGEST_SIDE = 1 << 16
 _TILE = 16 * STRIP
@@ -42,8 +42,8 @@ _TILE = 16 * STRIP
 class _Worker:
     """Memory that one thread works with."""
 
-    def __init__(self, stepped: bool, exact_times: bool) -> None:
-        self.memory: Any = driver.new_memory() if stepped else exact.new_memory()
+    def __init__(self, memory: Any, exact_times: bool) -> None:
+        self.memory = memory
         self.keys = np.empty(4096, np.int64)
         self.times = np.empty(self.keys.size if exact_times else 0)
 
@@ -113,9 +113,14 @@ class PixelArray:
         self._drift_per_s = pixel.thresholds.drift_per_s
         self._level = min(pixel.thresholds.on, pixel.thresholds.off)
         self._start = start = self._relative(t_ns)
-        stepped = driver_of(pixel, self.circuit, inside, method) == "run_stepped"
+        self._advance: Any = exact.run_exact
         self._stepping: Stepping | None = None
-        if stepped:
+        new_memory: Callable[[], Any] = exact.new_memory
+        if driver_of(pixel, self.circuit, inside, method) == "run_stepped":
+            self._advance, new_memory = driver.run_stepped, driver.new_memory
+            bare = method == "auto" and not inside and self._drift_per_s == 0.0
+            if bare and unfiltered.covers(self.circuit):
+                self._advance, new_memory = unfiltered.run_unfiltered, unfiltered.new_memory
             self._stepping = Stepping(
                 self.circuit, self.pixels, self.columns, inside, pixel.thresholds.drift_per_s,
                 self.origin_us, start, coarseness,
@@ -128,7 +133,7 @@ class PixelArray:
         self._tiles = strips // self._most + self.threads
         self._workers: SimpleQueue[_Worker] = SimpleQueue()
         for _ in range(self.threads):
-            self._workers.put(_Worker(stepped, exact_times))
+            self._workers.put(_Worker(new_memory(), exact_times))
         self.last_times = np.empty(0)
 
     def _relative(self, t_ns: int) -> float:
@@ -183,6 +188,8 @@ class PixelArray:
         self, part: Part, frames: FrameStack, starts: NDArray[Any]
     ) -> Iterable[tuple[Any, ...]]:
         """Return the further arguments of the solver, for each call of it."""
+        if self._advance is unfiltered.run_unfiltered:
+            return [(NOTHING,)]
         if self._stepping is not None:
             return self._stepping.runs(part, frames, starts)
         circuit, lengths = self.circuit, np.diff(starts)
@@ -200,14 +207,13 @@ class PixelArray:
         pool: ThreadPoolExecutor | None,
     ) -> list[Parted]:  # fmt: skip
         """Return the events of all tiles; each call finds its tile itself."""
-        advance: Any = exact.run_exact if self._stepping is None else driver.run_stepped
         claimed = nothing_claimed()
 
         def run(_: int) -> Parted:
             worker = self._workers.get()
             try:
                 buffer = EventBuffer(worker.keys, worker.times, t_base)
-                n, buffer = advance(claimed, self._most, *arguments, worker.memory, buffer)
+                n, buffer = self._advance(claimed, self._most, *arguments, worker.memory, buffer)
                 worker.keys, worker.times = buffer.keys, buffer.times
                 return Parted(worker.keys, worker.times, n, per_us)
             finally:

@@ -53,7 +53,8 @@ _VALUES = 1 << 22
 
 _NONE = np.zeros((0, 1))
 _NO_INDEX = np.zeros(0, np.int64)
-_NOTHING = Injected(np.zeros(0), np.zeros(0, np.bool_), _NO_INDEX, _NO_INDEX)
+NOTHING = Injected(np.zeros(0), np.zeros(0, np.bool_), _NO_INDEX, _NO_INDEX)
+"""No events from outside."""
 
 
 _WHITE = 255.0
@@ -225,7 +226,7 @@ class Stepping:
 
     def _injected(self, t0_us: float, t1_us: float) -> Injected:
         if not any(overrides(hook, "inject") for hook in self._hooks):
-            return _NOTHING
+            return NOTHING
         t0, t1 = (float(t) for t in self._seconds(np.array([t0_us, t1_us])))
         found = injected(self._hooks, t0, t1)
         pixels = found["y"].astype(np.int64) * self._columns + found["x"]

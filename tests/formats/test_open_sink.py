@@ -110,7 +110,7 @@ def test_failed_overwriting_keeps_the_old_output(tmp_path, name):
     assert content(tmp_path) == before
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, "out.raw"])
 def test_bytes_do_not_depend_on_threads_or_on_how_events_and_frames_come(tmp_path, name):
     events, frames = events_of(3, 150_000), frames_of(12)
 
