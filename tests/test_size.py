@@ -18,9 +18,9 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1400,
+    "": 1405,
     "batches": 1350,
-    "cli": 1300,
+    "cli": 1290,
     "comparison": 710,
     "compilation": 235,
     "config": 1300,
@@ -35,7 +35,7 @@ LIMITS = {
     "light": 865,
     "motion": 350,
     "pixel": 570,
-    "process": 260,
+    "process": 255,
     "rendering": 740,
     "reports": 1710,
     "representations": 112,
