@@ -131,7 +131,11 @@ def _import_compiler() -> Any:
 
 
 def import_ahead() -> None:
-    """Begin to import Numba, in a thread, while the caller goes on."""
+    """Begin to import Numba, in a thread, while the caller goes on.
+
+    Other functions that Numba compiles in this process may then lack SciPy's linear algebra, or sum
+    in another order: so for a process that compiles nothing of others.
+    """
 
     def load() -> None:
         # what is raised will come again where a compiled function is called
