@@ -1,8 +1,20 @@
 """The command ``adv2e``, and the same as ``python -m adv2e``."""
 
+import atexit
+import gc
 import os
 import signal
 import sys
+
+
+def collect_seldom() -> None:
+    """Look for cycles among many objects at a time only, and at the end of the program not at all.
+
+    Imports make tens of thousands of objects that stay, and compiling a million; looking through
+    them again and again takes longer than a short run may.
+    """
+    gc.set_threshold(200_000, 20, 20)
+    atexit.register(gc.freeze)
 
 
 def _leave_current_folder() -> None:
@@ -24,6 +36,7 @@ def _fill_standard_streams() -> None:
 
 def main() -> None:
     """Run the command line; a signal that comes while it is imported ends it quietly, too."""
+    collect_seldom()
     has_usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if has_usual:  # it has a traceback printed
         signal.signal(signal.SIGINT, lambda number, frame: os._exit(128 + number))

@@ -16,8 +16,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 import warm
 
+from adv2e.__main__ import collect_seldom
 from adv2e.cli import main
-from adv2e.process.machine import collect_seldom
 
 collect_seldom()  # to search the compiler's objects for cycles took a fourteenth of the run
 

@@ -18,11 +18,11 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1400,
+    "": 1405,
     "batches": 1350,
-    "cli": 1300,
+    "cli": 1290,
     "comparison": 710,
-    "compilation": 220,
+    "compilation": 235,
     "config": 1300,
     "conversion": 1180,
     "diagnosis": 6740,
@@ -32,13 +32,13 @@ LIMITS = {
     "formats": 5055,
     "inspection": 260,
     "kernel": 4995,
-    "light": 870,
+    "light": 865,
     "motion": 350,
     "pixel": 575,
-    "process": 260,
+    "process": 255,
     "rendering": 740,
     "reports": 1710,
-    "representations": 120,
+    "representations": 112,
     "sources": 3610,
     "synthetic": 160,
 }

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import atexit
 import difflib
-import gc
 import importlib
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +13,7 @@ from click.shell_completion import CompletionItem
 
 from adv2e import __version__
 from adv2e.cli.exit_status import flush_stdout, print_any_character, reporting, warnings_for_people
-from adv2e.process.machine import collect_seldom, return_large_blocks
+from adv2e.process.machine import return_large_blocks
 from adv2e.process.signals import stopping_on_signals
 
 COMMANDS = {
@@ -108,27 +104,13 @@ class Program(click.Group):
         if len(args) < 2:
             kwargs["prog_name"] = kwargs.get("prog_name") or "adv2e"
         print_any_character()
-        with stopping_on_signals(), warnings_for_people(), _memory_of_a_command():
+        return_large_blocks()
+        with stopping_on_signals(), warnings_for_people():
             try:
                 return super().main(*args, **kwargs)
             except SystemExit as end:
                 flush_stdout(quiet=bool(end.code))
                 raise
-
-
-@contextmanager
-def _memory_of_a_command() -> Iterator[None]:
-    """Give large blocks back at once; let many objects be made before Python looks for cycles.
-
-    At the end of the program it does not look at all.
-    """
-    return_large_blocks()
-    before = collect_seldom()
-    atexit.register(gc.freeze)
-    try:
-        yield
-    finally:
-        gc.set_threshold(*before)
 
 
 @click.group(

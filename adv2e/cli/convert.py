@@ -78,6 +78,8 @@ def command(
     from adv2e.conversion.convert import convert_input
 
     wanted = {**given, "overwrite": overwrite, "progress": progress}
+    # effects of others may compile what SciPy computes for Numba, which that import leaves out
+    is_ours = not click.get_current_context().params["effect_files"]
 
     def ready(reading: Reading, chosen: Config) -> None:
         gc.freeze()  # all that was imported stays; looking through it for garbage takes its time
@@ -91,7 +93,7 @@ def command(
         configured=_configured(),
         also_read=options.files_given,
         log=log,
-        begin=import_ahead,
+        begin=import_ahead if is_ours else lambda: None,
         ready=ready,
         capturing=_ENDED if log.level >= 0 else "",
         **wanted,

@@ -1,8 +1,9 @@
 """A folder in which compiled code is kept between runs, by this user alone.
 
 Whoever can write what is loaded as code runs as the user.  So a folder counts only if it is the
-user's own and nobody else may write to it.  Damaged code may do anything: a manifest holds the
-digest of every file, and what differs from it is removed before anything is loaded.
+user's own and nobody else may write to it.  Each function has a folder there.  Damaged code may do
+anything: a manifest holds the digest of every file, and what differs from it is removed before the
+function is loaded.
 
 Numba numbers the files of a function, so two processes that write at once could take the code of
 one signature for that of another.  Whoever writes holds :meth:`CodeCache.lock`; it is not held
@@ -19,6 +20,7 @@ import shutil
 import stat
 import sys
 import tempfile
+import threading
 import time
 import weakref
 from contextlib import suppress
@@ -53,7 +55,9 @@ class CodeCache:
         self.folder: Path | None = None
         self.why_not = ""
         self._file: BinaryIO | None = None
-        self._noted: dict[str, tuple[int, int]] = {}
+        self._holds = threading.RLock()
+        self._depth = 0
+        self._noted: dict[Path, tuple[int, int]] = {}
         for base in _bases():
             wrong = self._open(base / "adv2e", base / "adv2e" / name)
             if not wrong:
@@ -82,50 +86,63 @@ class CodeCache:
                 return f"{folder}: its file system knows no locks"
         except OSError as error:
             return f"{base}: {error.strerror or error}"
-        try:
-            self._remove_unknown(folder)
-        finally:
-            unlock_file(self._file)
+        unlock_file(self._file)
         return ""
 
     def lock(self) -> None:
-        """Wait until no other process writes here."""
-        if self._file is not None:
+        """Wait until no other thread or process writes here."""
+        self._holds.acquire()
+        self._depth += 1
+        if self._file is not None and self._depth == 1:
             lock_file(self._file, wait=True)
 
     def unlock(self) -> None:
-        """Let others write."""
-        if self._file is not None:
+        """Let others write, once for each :meth:`lock`."""
+        self._depth -= 1
+        if self._file is not None and self._depth == 0:
             unlock_file(self._file)
+        self._holds.release()
 
-    def note_files(self) -> None:
-        """Add to the manifest what came or changed since this process looked, under the lock."""
+    def checked(self, name: str) -> Path | None:
+        """Return the folder of one function, without files of code that differ from its manifest.
+
+        None: there is none to be trusted.
+        """
+        if self.folder is None:
+            return None
+        folder = self.folder / name
+        self.lock()
+        try:
+            listed = _listed(folder)
+            for file, path in _code(folder).items():
+                self._is_new(path)
+                if listed.get(file) != _digest(path):
+                    path.unlink()
+        except OSError:
+            return None
+        finally:
+            self.unlock()
+        return folder
+
+    def note_files(self, name: str) -> None:
+        """Add to a manifest what came or changed since this process looked, under the lock."""
         if self.folder is None:
             return
+        folder = self.folder / name
         with suppress(OSError):  # what is not listed is compiled again
-            listed = _listed(self.folder)
-            there = _code(self.folder)
-            digests = {name: listed[name] for name in there if name in listed}
-            for name, path in there.items():
-                if self._is_new(name, path):
-                    digests[name] = _digest(path)
-            part = self.folder / f"{_MANIFEST}.part"
+            listed = _listed(folder)
+            there = _code(folder)
+            digests = {file: listed[file] for file in there if file in listed}
+            digests |= {file: _digest(path) for file, path in there.items() if self._is_new(path)}
+            part = folder / f"{_MANIFEST}.part"
             part.write_text(json.dumps(digests, indent=0), encoding="utf-8")
-            part.replace(self.folder / _MANIFEST)
+            part.replace(folder / _MANIFEST)
 
-    def _is_new(self, name: str, path: Path) -> bool:
+    def _is_new(self, path: Path) -> bool:
         """Tell whether a file is not as it was when this process looked last, which is now."""
         status = path.stat()
-        before, self._noted[name] = self._noted.get(name), (status.st_mtime_ns, status.st_ino)
-        return before != self._noted[name]
-
-    def _remove_unknown(self, folder: Path) -> None:
-        """Remove every file of code that is not as the manifest says."""
-        listed = _listed(folder)
-        for name, path in _code(folder).items():
-            self._is_new(name, path)
-            if listed.get(name) != _digest(path):
-                path.unlink()
+        before, self._noted[path] = self._noted.get(path), (status.st_mtime_ns, status.st_ino)
+        return before != self._noted[path]
 
 
 def _bases() -> list[Path]:
@@ -139,10 +156,10 @@ def _bases() -> list[Path]:
 
 
 def _code(folder: Path) -> dict[str, Path]:
-    """Return each file of code, by its name below `folder`."""
+    """Return each file of a function's code, by its name below `folder`; Numba makes one there."""
     return {
         path.relative_to(folder).as_posix(): path
-        for path in sorted(folder.glob("*/**/*"))
+        for path in folder.glob("*/**/*")
         if path.is_file()
     }
 

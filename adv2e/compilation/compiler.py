@@ -8,9 +8,11 @@ the environment.  Where a program imported Numba before, that is left as it is.
 
 from __future__ import annotations
 
+import re
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
@@ -37,33 +39,45 @@ class _WithoutFile(SourceFileLoader):
 
 
 class _Finder(MetaPathFinder):
-    """Finds that module alone."""
+    """Finds that module, and no SciPy for the thread that makes it.
+
+    Where SciPy is installed, Numba imports half of it, to tell whether it could compile linear
+    algebra: as much as OpenCV and h5py together.  Nothing here needs that; functions of others that
+    do, import it when they are compiled.
+    """
+
+    def __init__(self) -> None:
+        self._thread = threading.get_ident()
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: object = None
     ) -> ModuleSpec | None:
+        if f"{fullname}.".startswith("scipy.") and threading.get_ident() == self._thread:
+            raise ModuleNotFoundError(f"No module named {fullname!r}", name=fullname)
         found = PathFinder.find_spec(fullname, path) if fullname == _SETTINGS else None
         if found is not None and found.origin is not None:
             found.loader = _WithoutFile(fullname, found.origin)
         return found
 
 
-def _import_numba() -> tuple[Any, Any, Any]:
+@contextmanager
+def lean_imports() -> Iterator[None]:
+    """Have this thread import Numba and what it loads later, but no SciPy and not that file."""
     finder = _Finder()
     sys.meta_path = [finder, *sys.meta_path]
     try:
-        names = "numba", "numba.core.event", "numba.extending"
-        numba, event, extending = map(import_module, names)
+        yield
     finally:
         # another thread may import meanwhile, and would miss a finder if its list became shorter
         sys.meta_path = [one for one in sys.meta_path if one is not finder]
-    return numba, event, extending.typeof_impl
 
 
-_numba: Any
-_event: Any
-_typeof: Any
-_numba, _event, _typeof = _import_numba()
+with lean_imports():
+    _numba: Any = import_module("numba")
+    _event: Any = import_module("numba.core.event")
+    _typeof: Any = import_module("numba.extending").typeof_impl
+
+VERSION: str = _numba.__version__
 
 
 def make_dispatcher(
@@ -77,12 +91,11 @@ def make_dispatcher(
     """Return Numba's stand-in for a function, whose code is kept in `cache`.
 
     Numba looks at its setting for the folder when a function is decorated; whoever else uses Numba
-    in this process keeps his own.  Code with and without a wrapper for Python has the same name
-    there, and so a folder each.
+    in this process keeps his own.
     """
     config = _numba.config
-    form = "entries" if called_from_python else "parts"
-    before, config.CACHE_DIR = config.CACHE_DIR, str(cache.folder / form if cache.folder else "")
+    folder = cache.checked(_folders(function)[not called_from_python]) if kept else None
+    before, config.CACHE_DIR = config.CACHE_DIR, str(folder or "")
     try:
         return _numba.njit(
             nogil=True,
@@ -90,16 +103,20 @@ def make_dispatcher(
             fastmath={"contract"},
             no_cpython_wrapper=not called_from_python,
             no_cfunc_wrapper=True,
-            cache=kept and cache.folder is not None,
+            cache=folder is not None,
             **options,
         )(function)
     finally:
         config.CACHE_DIR = before
 
 
-def warm_up() -> None:
-    """Have Numba load all that it looks up when it compiles or loads for the first time."""
-    _numba.njit(lambda: None)()
+def _folders(function: Callable[..., Any]) -> tuple[str, str]:
+    """Return the folders of a function's code, with and without a wrapper for Python.
+
+    Numba gives the files of both the same names.
+    """
+    name = re.sub(r"[^\w.]", "_", f"{function.__module__}.{function.__qualname__}")
+    return f"entries/{name}", f"parts/{name}"
 
 
 def know_type(of: type[Any]) -> None:
@@ -136,6 +153,7 @@ class _Listener(_event.Listener):  # type: ignore[misc]
         self._cache, self._watcher = cache, watcher
         self._lock = threading.RLock()
         self._depth = self._writes_at = 0
+        self._written: Any = None
 
     def on_start(self, event: Any) -> None:
         if event.kind == "numba:compile":
@@ -147,11 +165,12 @@ class _Listener(_event.Listener):  # type: ignore[misc]
     def on_end(self, event: Any) -> None:
         if event.kind == "numba:compile":
             self._cache.lock()
-            self._writes_at = self._depth
+            self._writes_at, self._written = self._depth, event.data["dispatcher"].py_func
             return
         if self._writes_at == self._depth:
             self._writes_at = 0
-            self._cache.note_files()
+            for folder in _folders(self._written):
+                self._cache.note_files(folder)
             self._cache.unlock()
         self._depth -= 1
         self._lock.release()

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from adv2e.config.model import Frames, Sampling
 from adv2e.effects.composition import overrides
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
-from adv2e.effects.hooks import Hooks
-from adv2e.light.sensor import Fitting
-from adv2e.sources.frame import Light
+
+if TYPE_CHECKING:  # 'adv2e info' does without the configuration, which takes time to import
+    from adv2e.config.model import Frames, Sampling
+    from adv2e.effects.hooks import Hooks
+    from adv2e.light.sensor import Fitting
+    from adv2e.sources.frame import Light
 
 
 def encoding_for(frames: Frames, auto: str) -> str:
@@ -50,14 +53,14 @@ def light_text(light: Light, white: float, frames: Frames | None = None) -> str:
 
     `white` is the number that means white, unless the configuration says another.
     """
-    frames = frames or Frames()
-    if frames.encoding != "auto":
+    encoding = encoding_for(frames, light.encoding) if frames else light.encoding
+    full_scale = frames.full_scale if frames else None
+    if frames and frames.encoding != "auto":
         why = ["as frames.encoding says"]
     else:
         why = [light.encoding_reason, "frames.encoding changes it"]
-    if frames.full_scale is not None:
+    if full_scale is not None:
         why.append("white as frames.full_scale says")
     elif light.full_scale_reason:
         why.append(f"white {light.full_scale_reason}")
-    encoding = encoding_for(frames, light.encoding)
-    return f"{encoding}, white {frames.full_scale or white:g} ({'; '.join(why)})"
+    return f"{encoding}, white {full_scale or white:g} ({'; '.join(why)})"

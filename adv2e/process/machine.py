@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ctypes
 import errno
-import gc
 import re
 from contextlib import suppress
 
@@ -71,14 +70,3 @@ def return_large_blocks() -> None:
     """
     with suppress(OSError, AttributeError, TypeError):  # TypeError: Windows knows no nameless one
         ctypes.CDLL(None).mallopt(_MMAP_THRESHOLD, LARGE_BYTES)
-
-
-def collect_seldom() -> tuple[int, int, int]:
-    """Look for cycles among many objects at a time only; return the thresholds that were.
-
-    Imports make tens of thousands of objects that stay, and compiling a million; looking through
-    them again and again takes longer than a short run may.
-    """
-    before = gc.get_threshold()
-    gc.set_threshold(200_000, 20, 20)
-    return before

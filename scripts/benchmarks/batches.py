@@ -29,7 +29,7 @@ import click
 from writing import output_option, table, write_report
 
 from adv2e.background import default_threads
-from benchmarks.clips import Clip, as_srgb, encoded, stored
+from benchmarks.clips import Clip, as_srgb, encoded
 from benchmarks.measure import (
     ALL,
     IDEAL,
@@ -70,7 +70,7 @@ def make_clips(folder: Path, count: int, moving: float) -> Path:
             continue
         clip = Clip(width=346, height=260, frames=FRAMES, fps=FPS, seed=seed, moving=moving)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
-            video = encoded(as_srgb(stored(clip, Path(scratch))), FPS)
+            video = encoded(as_srgb(clip, Path(scratch)), FPS)
             shutil.move(video, target)
     return made
 

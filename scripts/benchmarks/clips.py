@@ -1,8 +1,8 @@
 r"""Synthetic clips for benchmarks: the same frames for the same recipe, on any machine.
 
 A periodic texture with an amplitude spectrum :math:`f^{-1.25}` and log-normal grey values pans and
-turns; disks with soft edges cross it.  Frames are 8-bit grey values in linear light and stand for
-video that is interpolated already, so that no interpolation takes part in a comparison.
+turns; disks with soft edges cross it.  Frames are 8-bit grey values and stand for video that is
+interpolated already, so that no interpolation takes part in a comparison.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ class Clip:
     """A recipe, with `fps` frames a second.
 
     Anything moves only in the share `moving` of the rows, around the middle; the rest keeps its
-    first frame.
+    first frame.  Grey values are linear light, or of the same frames a code of it (`encoding`:
+    linear, srgb); decoded, contrast is twice as high, and about a fifth of the pixels have an event
+    from one frame to the next.
     """
 
     width: int
@@ -44,6 +46,7 @@ class Clip:
     fps: float = 240.0
     seed: int = 20260
     moving: float = 1.0
+    encoding: str = "linear"
 
     @property
     def times(self) -> Array:
@@ -52,7 +55,7 @@ class Clip:
 
     @property
     def name(self) -> str:
-        """A file name that tells every recipe from every other."""
+        """A file name that tells all frames from all others."""
         parts = [f"{self.width}x{self.height}x{self.frames}", f"{self.fps:g}fps"]
         for name, usual in (("seed", 20260), ("moving", 1.0)):
             if getattr(self, name) != usual:
@@ -221,8 +224,14 @@ def encoded(source: Path, fps: float) -> Path:
     return path
 
 
-def as_srgb(path: Path) -> Path:
-    """Return the clip with its light coded as 8-bit sRGB, beside the linear one."""
+def as_srgb(clip: Clip, folder: Path) -> Path:
+    """Return the ``.npy`` file of the clip with its light coded as 8-bit sRGB; make it if need be.
+
+    That of a linear clip lies beside it.
+    """
+    path = stored(clip, folder)
+    if clip.encoding == "srgb":
+        return path
     target = path.with_name(f"{path.stem}_srgb.npy")
     if not target.exists():
         part = target.with_suffix(".part")

@@ -298,9 +298,13 @@ class Plan:
     threads: int | None
     rounds: int = 1
 
-    def job(self, name: str, clip: Clip, sets: Sequence[str], **more: Any) -> Job:
-        """Return the job of a clip and of what is added to the ideal pixel."""
-        options = {"sets": [*IDEAL, *sets]}
+    def job(
+        self, name: str, clip: Clip, sets: Sequence[str], config: str | None = None, **more: Any
+    ) -> Job:
+        """Return the job of a clip and of what is added to `config`; default: the ideal pixel."""
+        files, base = ([config], ()) if config else ([], IDEAL)
+        light = f"frames.encoding={clip.encoding}"
+        options = {"files": files, "sets": [*base, light, *sets]}
         path = str(stored(clip, self.folder))
         return Job(
             name=name, clip=path, fps=clip.fps, options=options, threads=self.threads, **more

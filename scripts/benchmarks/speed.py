@@ -14,6 +14,7 @@ not, it is left out, and said so.
 from __future__ import annotations
 
 import fnmatch
+import json
 import shutil
 import subprocess
 import sys
@@ -27,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import click
 from writing import output_option, table, write_report
 
-from benchmarks.clips import Clip, as_srgb, encoded, stored
+from benchmarks.clips import Clip, as_srgb, encoded
 from benchmarks.measure import (
     ALL,
     DEAD_TIME,
@@ -63,26 +64,32 @@ OFF_NAME = "exact, noise off"
 """The setting that others are compared with."""
 
 SMALL, LARGE, AT_REST = "346x260", "1280x720", "346x260, 9/10 at rest"
+DENSE = "346x260, dense"
 CAMERAS = {
     "240x180": Clip(width=240, height=180, frames=480),
     SMALL: Clip(width=346, height=260, frames=480),
     LARGE: Clip(width=1280, height=720, frames=97),
     AT_REST: Clip(width=346, height=260, frames=1920, moving=0.1),
+    DENSE: Clip(width=346, height=260, frames=480, encoding="srgb"),
 }
 """Clips by name."""
+BESIDE_PEER = (SMALL, LARGE, DENSE)
+NOISY_DENSE = ("photoreceptor noise 0.03", "two poles and noise as measured")
 
 SPEED_ABOUT = (
     "Frames in memory to sorted events in memory, compiled and warmed up (four frames; then the"
     " garbage of the imports is collected, and 0.4 s waited for threads that spin, whatever the"
     " tool), each run in a process of its own,"
     " rounds interleaved: median (least..most). Mpx-frames: pixels times frames, in"
-    " millions, as the pixel sees them (after interpolation). Time: wall time relative to the first"
+    " millions, as the pixel sees them (after interpolation). CPU: processor time of all threads."
+    " Time: wall time relative to the first"
     " row of the table, paired by round. Peak memory is that of the whole process, with the"
     " interpreter, libraries, clip and all events."
 )
 FILES_ABOUT = (
-    "346x260, 240 frames a second, light coded as sRGB, MP4 (mp4v). Whole processes, from start to"
-    " end, so with imports and compiled code loaded from its cache: median (least..most)."
+    "240 frames a second, light coded as sRGB, MP4 (mp4v). Whole processes, from start to"
+    " end, so with imports and compiled code loaded from its cache: median (least..most). Time is"
+    " relative to the first row, paired by round."
 )
 
 
@@ -90,12 +97,14 @@ FILES_ABOUT = (
 class Setting:
     """A configuration of adv2e on one of :data:`CAMERAS`: what it adds to the ideal pixel.
 
+    Where `config` names a shipped one, it adds to that.
     Slow ones take a `share` of the clip's frames; of these, every `stride`-th is taken.
     """
 
     clip: str
     name: str
     sets: tuple[str, ...] = ()
+    config: str | None = None
     share: float = 1.0
     stride: int = 1
 
@@ -104,6 +113,8 @@ def settings() -> Iterator[Setting]:
     """Yield all settings of adv2e."""
     main = {OFF_NAME: (), "all effects, shot 5 Hz": ALL, "all effects, shot 0.1 Hz": ALL_WEAK}
     for clip in CAMERAS:
+        if clip == DENSE:
+            continue
         for name, sets in main.items():
             yield Setting(clip=clip, name=name, sets=sets)
         for name, sets in main.items():
@@ -133,6 +144,11 @@ def settings() -> Iterator[Setting]:
     for name, sets in noisy.items():
         yield Setting(clip=SMALL, name=name, sets=sets)
         yield Setting(clip=AT_REST, name=name, sets=sets, share=0.25)
+    dense = {OFF_NAME: (), "all effects, shot 5 Hz": ALL, "second pole 1000 Hz": (POLE,)}
+    for name, sets in {**dense, **{key: noisy[key] for key in NOISY_DENSE}}.items():
+        yield Setting(clip=DENSE, name=name, sets=sets)
+    shipped = "davis346"
+    yield Setting(clip=DENSE, name=f"{shipped}, L = 1", sets=("sampling.L=1",), config=shipped)
     decoded = ("frames.encoding=srgb", SHIPPED_KNEE, "sampling.L=10")
     yield Setting(clip=SMALL, name="sRGB decoded, L = 10, noise off", sets=decoded, stride=10)
 
@@ -149,13 +165,13 @@ def setting_jobs(plan: Plan) -> Iterator[Job]:
         clip = _clip(one.clip, plan)
         frames = max(8, round(one.share * clip.frames / one.stride))
         name = f"{one.clip}: {one.name}"
-        yield plan.job(name, clip, one.sets, frames=frames, stride=one.stride)
+        yield plan.job(name, clip, one.sets, one.config, frames=frames, stride=one.stride)
 
 
 def peer_jobs(plan: Plan, python: str) -> Iterator[Job]:
     """Yield the jobs of EventCV, on frames in memory."""
-    for camera in (SMALL, LARGE):
-        clip = str(as_srgb(stored(_clip(camera, plan), plan.folder)))
+    for camera in BESIDE_PEER:
+        clip = str(as_srgb(_clip(camera, plan), plan.folder))
         for steps, effects in (("off", 0), ("10", 0), ("adaptive", 0), ("10", 1)):
             what = "all effects" if effects else "noise off"
             options = {"arguments": peer_arguments(bool(effects), steps)}
@@ -179,37 +195,41 @@ def chosen(jobs: Sequence[Job], globs: Sequence[str], option: str) -> list[Job]:
 
 
 def file_jobs(plan: Plan, peer: str | None, scratch: Path, notes: list[str]) -> list[Job]:
-    """Return whole conversions of a video; what cannot be measured is added to `notes`."""
-    camera = CAMERAS[SMALL]
-    # what both tools take video for: the same light then as of the frames in memory
-    clip = as_srgb(stored(replace(camera, frames=97) if plan.quick else camera, plan.folder))
-    video = str(encoded(clip, camera.fps))
-    quiet = (*(one for one in IDEAL if not one.startswith("sampling.")), "sampling.L=1")
-    cases = {
+    """Return whole conversions of videos, named ``clip: what``; notes how EventCV reads them."""
+    by_itself = bool(shutil.which("ffmpeg") and shutil.which("ffprobe"))
+    if peer and not by_itself:
+        notes.append(
+            "EventCV reads files through ffmpeg and ffprobe, which are not on PATH: here OpenCV"
+            " decodes for it."
+        )
+    quiet = (
+        *(one for one in IDEAL if not one.startswith("sampling.")),
+        "frames.encoding=srgb",
+        "sampling.L=1",
+    )
+    usual = {
         "adv2e to HDF5, noise off, L = 1": (".h5", quiet),
         "adv2e to text, noise off, L = 1": (".txt", quiet),
         "adv2e to HDF5, as shipped, L = 1": (".h5", ("sampling.L=1",)),
         "adv2e to text, as shipped, L = 1": (".txt", ("sampling.L=1",)),
         "adv2e to HDF5, as shipped (L = 10)": (".h5", ()),
     }
+    first = next(iter(usual))
     commands = {}
-    for k, (name, (suffix, sets)) in enumerate(cases.items()):
-        target = str(scratch / f"out{k}{suffix}")
-        words = [word for one in sets for word in ("--set", one)]
-        words += ["--threads", str(plan.threads)] if plan.threads else []
-        program = [sys.executable, "-m", "adv2e", "convert", video, "-o", target]
-        commands[name] = [*program, "--overwrite", "-q", *words], target
-    if peer is not None and not (shutil.which("ffmpeg") and shutil.which("ffprobe")):
-        notes.append("EventCV reads files through ffmpeg and ffprobe, which are not on PATH.")
-        peer = None
-    for steps in ("off", "10", "adaptive") if peer else ():
-        target = str(scratch / f"eventcv_{steps}.h5")
-        given = peer_arguments(False, steps)
-        given["threshold"] = given.pop("pos_thres")
-        del given["neg_thres"]
-        words = [w for k, v in given.items() for w in (f"--{k.replace('_', '-')}", f"{v}")]
-        program = [str(peer), "-m", "eventcv", "simulate", video, target, "--quiet"]
-        commands[f"EventCV to HDF5, sub-steps {steps}, noise off"] = [*program, *words], target
+    for camera, cases in {SMALL: usual, DENSE: {first: usual[first]}}.items():
+        # what both tools take video for
+        clip = replace(CAMERAS[camera], frames=97) if plan.quick else CAMERAS[camera]
+        video = str(encoded(as_srgb(clip, plan.folder), clip.fps))
+        for name, (suffix, sets) in cases.items():
+            target = str(scratch / f"out{len(commands)}{suffix}")
+            words = [word for one in sets for word in ("--set", one)]
+            words += ["--threads", str(plan.threads)] if plan.threads else []
+            program = [sys.executable, "-m", "adv2e", "convert", video, "-o", target]
+            commands[f"{camera}: {name}"] = [*program, "--overwrite", "-q", *words], target
+        for steps in ("off", "10", "adaptive") if peer else ():
+            target = str(scratch / f"out{len(commands)}.h5")
+            command = _peer_command(str(peer), video, target, steps, by_itself)
+            commands[f"{camera}: EventCV to HDF5, sub-steps {steps}, noise off"] = command, target
     return [
         Job(
             name=name, action="run_command", options={"command": command, "target": target},
@@ -217,6 +237,23 @@ def file_jobs(plan: Plan, peer: str | None, scratch: Path, notes: list[str]) -> 
         )
         for name, (command, target) in commands.items()
     ]  # fmt: skip
+
+
+def _peer_command(python: str, video: str, target: str, steps: str, by_itself: bool) -> list[str]:
+    """Return the command by which EventCV converts a video, `by_itself` or decoded by OpenCV."""
+    given = peer_arguments(False, steps)
+    if not by_itself:
+        return [
+            python,
+            str(Path(__file__).with_name("worker.py")),
+            video,
+            target,
+            json.dumps(given),
+        ]
+    given["threshold"] = given.pop("pos_thres")
+    del given["neg_thres"]
+    words = [w for k, v in given.items() for w in (f"--{k.replace('_', '-')}", f"{v}")]
+    return [python, "-m", "eventcv", "simulate", video, target, "--quiet", *words]
 
 
 # --- tables --------------------------------------------------------------------------------------
@@ -236,18 +273,23 @@ def megapixel_frames(one: Measured) -> float:
     return float(one.last["pixels"]) * seen_frames(one) / 1e6
 
 
-def speed_tables(measured: Sequence[Measured]) -> str:
-    """Return a table a clip; jobs are named ``clip: what``."""
+def by_clip(measured: Sequence[Measured]) -> dict[str, list[Measured]]:
+    """Return what was measured, by clip; jobs are named ``clip: what``."""
     clips: dict[str, list[Measured]] = {}
     for one in measured:
         clips.setdefault(one.job.name.partition(": ")[0], []).append(one)
+    return clips
+
+
+def speed_tables(measured: Sequence[Measured]) -> str:
+    """Return a table a clip."""
     head = (
-        "setting", "Mpx-frames/s", "a CPU second", "CPU ns a pixel-frame", "time", "frames",
-        "M events", "Mev/s", "peak MiB",
+        "setting", "Mpx-frames/s", "a CPU second", "CPU ns a pixel-frame", "CPU ns an event",
+        "time", "frames", "M events", "Mev/s", "peak MiB",
     )  # fmt: skip
     parts = [
         f"**{clip}**\n\n{table(head, [_speed_row(one, rows[0]) for one in rows])}"
-        for clip, rows in clips.items()
+        for clip, rows in by_clip(measured).items()
     ]
     return "\n\n".join([SPEED_ABOUT, *parts])
 
@@ -259,6 +301,7 @@ def _speed_row(one: Measured, first: Measured) -> list[str]:
         str(one.wall_s().inverse(size)),
         number(size / one.cpu_s().median),
         number(1e3 * one.cpu_s().median / size),
+        number(1e3 * one.cpu_s().median / events) if events else "-",
         str(one.ratio(first).times(megapixel_frames(first) / size)),  # lengths may differ
         number(seen_frames(one)),
         number(events),
@@ -274,27 +317,31 @@ def relative_table(measured: Sequence[Measured]) -> str:
     rows = []
     for name in dict.fromkeys(peers):
         own = "all effects, shot 5 Hz" if "all effects" in name else OFF_NAME
-        pairs = [[named.get(f"{clip}: {one}") for one in (name, own)] for clip in (SMALL, LARGE)]
+        pairs = [[named.get(f"{clip}: {one}") for one in (name, own)] for clip in BESIDE_PEER]
         cells = [
             str(a.ratio(b).times(megapixel_frames(b) / megapixel_frames(a))) if a and b else "-"
             for a, b in pairs
         ]
         if any(cell != "-" for cell in cells):
             rows.append([name, *cells])
-    return table(("relative time", SMALL, LARGE), rows) if rows else ""
+    return table(("relative time", *BESIDE_PEER), rows) if rows else ""
 
 
 def files_table(found: Sequence[Measured]) -> str:
-    """Return the table of whole conversions."""
-    head = ("conversion", "wall s", "CPU s", "time", "MB", "peak MiB")
-    rows = [
-        [
-            one.job.name, str(one.wall_s()), number(one.cpu_s().median), str(one.ratio(found[0])),
-            number(one.last["bytes"] / 1e6), one.peak_text(),
-        ]
-        for one in found
-    ]  # fmt: skip
-    return f"{FILES_ABOUT}\n\n{table(head, rows)}"
+    """Return a table a clip of whole conversions."""
+    head = ("conversion", "wall s", "CPU s", "time", "CPU", "MB", "peak MiB")
+    parts = []
+    for clip, measured in by_clip(found).items():
+        rows = [
+            [
+                one.job.name.partition(": ")[2], str(one.wall_s()), number(one.cpu_s().median),
+                str(one.ratio(measured[0])), str(one.ratio(measured[0], "cpu_s")),
+                number(one.last["bytes"] / 1e6), one.peak_text(),
+            ]
+            for one in measured
+        ]  # fmt: skip
+        parts.append(f"**{clip}**\n\n{table(head, rows)}")
+    return "\n\n".join([FILES_ABOUT, *parts])
 
 
 @click.command()

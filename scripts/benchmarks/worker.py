@@ -94,7 +94,7 @@ class Tool(NamedTuple):
 def _of_adv2e(options: dict[str, Any], threads: int | None) -> Callable[[Any, float], Any]:
     import adv2e  # noqa: PLC0415 - the package that the job names
 
-    config = adv2e.load_config([], options["sets"])
+    config = adv2e.load_config(options.get("files", []), options["sets"])
 
     def run(frames: Any, fps: float) -> Any:
         times = np.arange(len(frames)) / fps

@@ -3,6 +3,7 @@
 import os
 import shutil
 import stat
+import threading
 import time
 
 import pytest
@@ -98,30 +99,44 @@ def test_the_first_folder_that_will_do_is_taken(base, monkeypatch):
 
 def test_only_what_the_manifest_lists_and_as_it_was_stays(base):
     cache = CodeCache("kernels-1")
-    code = cache.folder / "kernel_0"
-    code.mkdir()
+    code = cache.checked("parts/f") / "kernel_0"
+    code.mkdir(parents=True)
     for name in ("a.nbi", "a.1.nbc", "changed.nbc"):
         (code / name).write_bytes(bytes(range(60)))
-    cache.note_files()
+    cache.note_files("parts/f")
     (code / "later.nbc").write_bytes(b"killed before it was noted")
     data = bytearray((code / "changed.nbc").read_bytes())
     data[7] ^= 1
     (code / "changed.nbc").write_bytes(data)
-    CodeCache("kernels-1")
+    CodeCache("kernels-1").checked("parts/f")
     assert sorted(path.name for path in code.iterdir()) == ["a.1.nbc", "a.nbi"]
+
+
+def test_a_thread_that_gives_its_lock_back_leaves_that_of_another(base):
+    cache, other = CodeCache("kernels-1"), CodeCache("kernels-1")
+    cache.lock()
+    cache.checked("parts/f")  # locks and unlocks
+    thread = threading.Thread(target=other.checked, args=("parts/f",))
+    thread.start()
+    thread.join(0.3)
+    assert thread.is_alive()  # it waits
+    cache.unlock()
+    thread.join(60)
+    assert not thread.is_alive()
 
 
 @pytest.mark.parametrize("manifest", [None, "", "[]", '{"a": '])
 def test_without_a_manifest_nothing_stays(base, manifest):
     cache = CodeCache("kernels-1")
-    code = cache.folder / "kernel_0"
-    code.mkdir()
+    folder = cache.checked("parts/f")
+    code = folder / "kernel_0"
+    code.mkdir(parents=True)
     (code / "a.nbi").touch()
-    cache.note_files()
-    (cache.folder / "manifest.json").unlink()
+    cache.note_files("parts/f")
+    (folder / "manifest.json").unlink()
     if manifest is not None:
-        (cache.folder / "manifest.json").write_text(manifest)
-    CodeCache("kernels-1")
+        (folder / "manifest.json").write_text(manifest)
+    CodeCache("kernels-1").checked("parts/f")
     assert list(code.iterdir()) == []
 
 

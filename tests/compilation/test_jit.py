@@ -260,7 +260,7 @@ def test_numba_cache_dir_comes_first(start, tmp_path):
 def test_the_digest_covers_the_constants_that_compiled_code_takes_in():
     """Whatever a file of the kernel imports in capitals lies in a file of the digest."""
     package = Path(adv2e.__file__).parent
-    covered = set(jit.sources())
+    covered = {package / name for name in jit.sources()}
     assert package / "compilation" / "compiler.py" in covered  # which says how to compile
     seen = 0
     for path in (path for path in covered if package / "kernel" in path.parents):
@@ -279,7 +279,7 @@ def test_what_is_imported_after_the_compiler_extends_it(tmp_path):
     script = (
         "from adv2e import compiled\n"
         "import numpy as np\n"
-        "compiled._compiler().warm_up()\n"
+        "compiled._nothing()\n"
         "from adv2e.kernel.work_queue import claim, nothing_claimed\n"
         "print(*claim(nothing_claimed(), 5000))\n"
     )
@@ -312,8 +312,30 @@ def test_what_has_one_byte_changed_is_not_loaded_but_made_again(start, tmp_path,
         if turn % 50 == 0:
             assert said(start(1))[0] == "20"
             continue
-        assert CodeCache(folder.name).folder == folder.resolve()
+        cache = CodeCache(folder.name)
+        assert cache.folder == folder.resolve()
+        for one in {path.parents[1] for path in whole if path.suffix == ".nbc"}:
+            assert cache.checked(str(one.relative_to(folder))) == one
         if path.suffix != ".json":
             assert not path.exists()
         for one in folder.rglob("*.nb?"):
             assert one.read_bytes() == whole[one]
+
+
+WITHOUT_SCIPY = """
+import sys, threading
+from adv2e import compiled
+compiled.import_ahead()
+for thread in threading.enumerate():
+    if thread is not threading.current_thread():
+        thread.join()
+print("numba" in sys.modules, "scipy.linalg" in sys.modules)
+import numba, numpy as np
+product = numba.njit(lambda a, b: a @ b)
+print(product(np.eye(2), np.eye(2)).sum(), "scipy.linalg" in sys.modules)
+"""
+
+
+def test_an_import_ahead_leaves_out_scipy_which_others_find(start):
+    pytest.importorskip("scipy")
+    assert said(start(code=WITHOUT_SCIPY)) == ["True", "False", "2.0", "True"]

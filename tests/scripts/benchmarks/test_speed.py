@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -60,6 +61,14 @@ def test_every_recipe_has_a_file_of_its_own():
     assert len({clip.name for clip in [base, *changed]}) == 7
 
 
+def test_a_fifth_of_the_pixels_of_the_dense_clip_have_an_event_from_frame_to_frame(tmp_path):
+    dense = replace(speed.CAMERAS[speed.DENSE], frames=9)
+    job = measure.Plan(tmp_path, quick=False, threads=1).job("dense", dense, ())
+    report = worker.simulate(vars(job))
+    assert report["events"] / (8 * report["pixels"]) == pytest.approx(0.22, abs=0.06)
+    assert clips.as_srgb(dense, tmp_path) == Path(job.clip)  # its values are codes already
+
+
 def test_only_a_band_of_the_rows_moves():
     recipe = clips.Clip(width=60, height=50, frames=6, moving=0.2, fps=24)
     frames = np.stack(list(recipe.render())).astype(int)
@@ -74,6 +83,27 @@ def test_a_stored_clip_is_not_made_again(tmp_path):
     assert clips.stored(recipe, tmp_path) == path
     assert not np.load(path).any()
     assert [p.suffix for p in tmp_path.iterdir() if p.suffix not in (".npy", ".json")] == []
+
+
+def test_files_hold_the_light_of_the_frames_in_memory(tmp_path, monkeypatch):
+    small = {
+        name: replace(clip, width=32, height=24, frames=5) for name, clip in speed.CAMERAS.items()
+    }
+    monkeypatch.setattr(speed, "CAMERAS", small)
+    plan = measure.Plan(tmp_path, quick=False, threads=1)
+    notes = []
+    jobs = {job.name: job for job in speed.file_jobs(plan, sys.executable, tmp_path, notes)}
+    for camera in (speed.SMALL, speed.DENSE):
+        ours = jobs[f"{camera}: adv2e to HDF5, noise off, L = 1"].options["command"]
+        codes = clips.as_srgb(small[camera], tmp_path)
+        assert str(codes.with_suffix(".mp4")) in ours
+        encodings = [word for word in ours if word.startswith("frames.encoding=")]
+        assert encodings[-1] == "frames.encoding=srgb"
+        for steps in ("off", "10"):
+            theirs = jobs[f"{camera}: EventCV to HDF5, sub-steps {steps}, noise off"]
+            assert str(codes.with_suffix(".mp4")) in theirs.options["command"]
+    has_ffmpeg = bool(shutil.which("ffmpeg") and shutil.which("ffprobe"))
+    assert has_ffmpeg or "here OpenCV decodes" in notes[0]
 
 
 # Processes ----------------------------------------------------------------------------------------
@@ -172,6 +202,9 @@ def test_every_setting_is_a_valid_configuration_with_a_name_of_its_own():
     found = list(speed.settings())
     assert len({(one.clip, one.name) for one in found}) == len(found)
     for one in found:
+        if one.config is not None:
+            assert load_config(one.config, one.sets).sampling.L == 1  # as the table counts frames
+            continue
         config = load_config([], [*measure.IDEAL, *one.sets])
         assert config.pixel.thresholds.on == config.pixel.thresholds.off == 0.2
         white_hz = 2200.0 if "as measured" in one.name else 300.0
@@ -199,8 +232,8 @@ def test_other_tools_are_told_relative_to_the_same_effects():
         found.append(measure.Measured(replace(one.job, name=f"346x260: {name}"), one.rounds))
     rows = speed.relative_table(found).splitlines()[2:]
     assert rows == [
-        "| EventCV, sub-steps off, noise off | 3.00 | - |",
-        "| EventCV, sub-steps 10, all effects | 4.00 | - |",
+        "| EventCV, sub-steps off, noise off | 3.00 | - | - |",
+        "| EventCV, sub-steps 10, all effects | 4.00 | - | - |",
     ]
     assert speed.relative_table(found[:2]) == ""
 
@@ -210,8 +243,12 @@ def test_speed_table_counts_a_pixel_frame():
     longer = measured([2.0], [2.0], pixels=10_000, frames=200, events=50_000)
     rows = speed.speed_tables([first, longer]).splitlines()[-2:]
     cells = [[cell.strip() for cell in row.strip("|").split("|")] for row in rows]
-    assert cells[0] == ["setting", "2.00", "1.00", "1,000", "1.00", "100", "0.05", "0.10", "80"]
-    assert cells[1][:5] == ["setting", "1.00", "1.00", "1,000", "2.00"]
+    assert cells[0] == [
+        *("setting", "2.00", "1.00", "1,000", "20,000", "1.00", "100", "0.05", "0.10", "80")
+    ]
+    assert cells[1][:6] == ["setting", "1.00", "1.00", "1,000", "40,000", "2.00"]
+    silent = measured([1.0], pixels=10_000, frames=100, events=0)
+    assert "| - |" in speed.speed_tables([silent]).splitlines()[-1]
 
 
 def test_unknown_settings_are_an_error_and_known_ones_make_a_report(tmp_path, monkeypatch):
