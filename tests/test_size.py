@@ -18,7 +18,7 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1405,
+    "": 1410,
     "batches": 1350,
     "cli": 1290,
     "comparison": 710,
