@@ -25,7 +25,7 @@ LIMITS = {
     "compilation": 235,
     "config": 1300,
     "conversion": 1180,
-    "diagnosis": 6740,
+    "diagnosis": 6780,
     "effects": 1530,
     "exporting": 470,
     "files": 780,

@@ -136,8 +136,8 @@ def diagnose_file(
 
 
 SAY_EVERY_S = 30.0
-USUAL = 1300
-"""Simulations of a diagnosis that finds its effect at once; others take up to nine times as many
+USUAL = 1200
+"""Simulations of a diagnosis that finds its effect at once; others take up to seven times as many
 (the README of this package)."""
 
 

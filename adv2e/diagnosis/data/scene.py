@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,7 +162,8 @@ def _weighted_quantiles(
 class Placed:
     """A stream, and where each of its events lies in the scene, (n,).
 
-    Frame interval, segment of time, part of the data, and classes of speed and brightness.
+    Frame interval, segment of time, part of the data, and classes of speed and brightness; and what
+    several statistics need, made once, by whoever makes it.
     """
 
     stream: Stream
@@ -170,17 +172,18 @@ class Placed:
     part: NDArray[np.int64]
     speed: NDArray[np.int64]
     brightness: NDArray[np.int64]
+    made: dict[Any, Any] = field(default_factory=dict, compare=False)
 
     @classmethod
     def of(cls, stream: Stream, scene: Scene) -> Placed:
         interval = scene.interval_of(stream.t)
         segment = scene.split.segment_of(stream.t)
-        pixel = stream.pixel
+        seen, known = (one * scene.pixels + stream.pixel for one in (interval, segment))
         return cls(
             stream=stream,
             interval=interval,
             segment=segment,
-            part=scene.split.label[segment, pixel].astype(np.int64),
-            speed=scene.speed[interval, pixel].astype(np.int64),
-            brightness=scene.brightness[interval, pixel].astype(np.int64),
+            part=scene.split.label.take(known).astype(np.int64),
+            speed=scene.speed.take(seen).astype(np.int64),
+            brightness=scene.brightness.take(seen).astype(np.int64),
         )

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.compiled import kernel
 from adv2e.events import EVENT_DTYPE, Events
 
 TRAIN, VALIDATION, TEST = 0, 1, 2
@@ -102,11 +103,13 @@ class Stream:
         In which order a file has these is a habit of who wrote it, and no neighbours in time would
         be neighbours on the sensor as often as by chance.
         """
-        pixel = events["y"].astype(np.int32) * width + events["x"]
-        order = np.lexsort((pixel, events["t"]))
-        return cls(
-            events["t"][order], pixel[order], events["p"][order].astype(np.int8), width, height
-        )
+        t, pixel = events["t"].copy(), events["y"].astype(np.int32) * width + events["x"]
+        on = events["p"].astype(np.int8)
+        place = (t - t[:1]) * (width * height) + pixel
+        if np.any(place[1:] < place[:-1]):  # those of pixels come in order
+            order = np.argsort(place, kind="stable")
+            t, pixel, on = t[order], pixel[order], on[order]
+        return cls(t, pixel, on, width, height)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -125,27 +128,29 @@ class Stream:
         return events
 
     @cached_property
-    def by_pixel(self) -> NDArray[np.int64]:
-        # radix sort for 16-bit numbers
-        small = self.width * self.height <= 1 << 16
-        return np.argsort(self.pixel.astype(np.uint16) if small else self.pixel, kind="stable")
-
-    @cached_property
-    def _before(self) -> NDArray[np.int64]:
+    def before(self) -> NDArray[np.int64]:
         """Index of the event before each in its pixel; its own where there is none."""
-        order, pixel = self.by_pixel, self.pixel[self.by_pixel]
-        before = np.arange(len(self))
-        same = pixel[1:] == pixel[:-1]
-        before[order[1:][same]] = order[:-1][same]
+        before = np.empty(len(self), np.int64)
+        _find_before(self.pixel, np.full(self.width * self.height, -1, np.int64), before)
         return before
 
     @cached_property
     def since(self) -> NDArray[np.int64]:
         """Time since the event before it in its pixel [us]; -1: there is none."""
-        none = self._before == np.arange(len(self))
-        return np.where(none, -1, self.t - self.t[self._before])
+        since = self.t - self.t[self.before]
+        since[self.before == np.arange(len(self))] = -1
+        return since
 
     @cached_property
     def on_before(self) -> NDArray[np.int8]:
         """Polarity of the event before it in its pixel; where there is none, its own."""
-        return self.on[self._before]
+        return self.on[self.before]
+
+
+@kernel
+def _find_before(pixel: Any, last: Any, before: Any) -> None:
+    """Compute :attr:`Stream.before`; `last`, (pixels,): -1, room for the last event of each."""
+    for i in range(pixel.shape[0]):
+        n = pixel[i]
+        before[i] = i if last[n] < 0 else last[n]
+        last[n] = i

@@ -78,17 +78,24 @@ class Fitter:
     def at_best_starts(
         self, candidates: Sequence[Candidate], base: Config, seeds: Sequence[int]
     ) -> list[Fitted]:
+        """Return the fit of each candidate at its best start, which the first seed tells."""
         fits = [
             Fitted.at(start, candidate, base)
             for candidate in candidates
             for start in candidate.starts
         ]
-        for fit, mean in zip(fits, self.whites([fit.config for fit in fits], seeds), strict=True):
-            fit.misfit = self._misfit(fit, fit.point, mean)
-        return [
+        self._judge(fits, seeds[:1])
+        best = [
             min((fit for fit in fits if fit.candidate is one), key=lambda fit: fit.misfit)
             for one in candidates
         ]
+        self._judge(best, seeds)
+        return best
+
+    def _judge(self, fits: Sequence[Fitted], seeds: Sequence[int]) -> None:
+        """Set the misfit of fits where they are."""
+        for fit, mean in zip(fits, self.whites([fit.config for fit in fits], seeds), strict=True):
+            fit.misfit = self._misfit(fit, fit.point, mean)
 
     def misfit(self, config: Config, seeds: Sequence[int]) -> float:
         return self._square(self.whites([config], seeds)[0])
@@ -102,9 +109,9 @@ class Fitter:
         return self._square(mean) + float(np.sum(fit.certainty * fit.amiss(point) ** 2))
 
     def improve(self, fits: Sequence[Fitted], seeds: Sequence[int]) -> None:
-        """Move every fit by one step, all of them with one batch of simulations for each half.
+        """Move every fit by one step, all of them with one batch of simulations for each part.
 
-        Two `seeds` at least.
+        A shorter step is tried where the whole one makes it no better.  Two `seeds` at least.
         """
         fits = [fit for fit in fits if fit.candidate.parameters]
         if not fits:
@@ -116,7 +123,7 @@ class Fitter:
             for point in (fit.point, *points)
         ]
         whites = iter(self._white_of_seeds(configs, seeds))
-        trials: list[list[Array]] = []
+        moves: list[Array] = []
         for fit, points in zip(fits, nudged, strict=True):
             here = next(whites)
             columns = [
@@ -127,23 +134,22 @@ class Fitter:
             move = _damped(fit, slope)
             fit.normal, fit.derivative, fit.simulations = slope.normal, slope.derivative, len(seeds)
             fit.covariance = np.linalg.pinv(slope.normal) * _of_mean(len(seeds))
-            trials.append([fit.inside(fit.point + share * move) for share in _SHARES])
-        tried = [
-            fit.at_point(point)
-            for fit, points in zip(fits, trials, strict=True)
-            for point in points
-        ]
-        means = iter(self.whites(tried, seeds))
-        for fit, points in zip(fits, trials, strict=True):
-            misfits = [self._misfit(fit, point, next(means)) for point in points]
-            nearest = int(np.argmin(misfits))
+            moves.append(move)
             fit.reach = max(0.5 * fit.reach, _NARROW)
-            if misfits[nearest] >= fit.misfit:
-                fit.moved, fit.damping = 0.0, 4.0 * fit.damping
-                continue
-            fit.moved = float(np.max(np.abs(points[nearest] - fit.point) / fit.deviation))
-            fit.misfit, fit.point = misfits[nearest], points[nearest]
-            fit.damping = max(0.25 * fit.damping, 1e-3)
+        failed = list(range(len(fits)))
+        for share in _SHARES:
+            points = [fits[k].inside(fits[k].point + share * moves[k]) for k in failed]
+            tried = [fits[k].at_point(point) for k, point in zip(failed, points, strict=True)]
+            means = self.whites(tried, seeds) if tried else ()
+            for k, point, mean in zip(tuple(failed), points, means, strict=True):
+                fit, misfit = fits[k], self._misfit(fits[k], point, mean)
+                if misfit < fit.misfit:
+                    fit.moved = float(np.max(np.abs(point - fit.point) / fit.deviation))
+                    fit.misfit, fit.point = misfit, point
+                    fit.damping = max(0.25 * fit.damping, 1e-3)
+                    failed.remove(k)
+        for k in failed:
+            fits[k].moved, fits[k].damping = 0.0, 4.0 * fits[k].damping
 
     def refine(self, fit: Fitted, rounds: Sequence[Sequence[int]]) -> None:
         """Bring a fit that is near its end, and was moved at least once, there.

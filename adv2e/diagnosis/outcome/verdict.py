@@ -220,8 +220,9 @@ def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion
 
 
 _SEEN = 0.8
-_ROUNDS = (range(1, 3), range(301, 305), range(305, 315))
-"""Seeds of the recordings that are simulated at each size; first those of the starts."""
+_ROUNDS = (range(1, 3), range(301, 305), range(305, 311))
+"""Seeds of the recordings that are simulated at each size: first those of the starts.  In the end
+those of the last two rounds count."""
 _FARTHEST = 10.0
 _SETTLED = 2.0
 """Factor by which the last round may still change a size that is told."""
@@ -256,7 +257,7 @@ def detectable(
         for size, rows in zip(sizes, sample, strict=True):
             recordings = reference.error.blurred(rows, BOTH, OF_RECORDINGS)
             factors = [_missing(ensemble, row) for row in recordings]
-            size.change_by(float(np.quantile(factors, _SEEN)))
+            size.change_by(factors, [*size.before, *factors] if is_last else factors)
         sizes = [size for size in sizes if math.isfinite(size.factor)]
     return [size.found(declared.config) for size in every]
 
@@ -265,7 +266,8 @@ def detectable(
 class _Size:
     """An effect, the value of its first key where it does nothing, that now, and other keys'.
 
-    `factor`: by which the last round changed it; infinite: it left the physical range.
+    `factor`: by which the last round changed it; infinite: it left the physical range.  `before`:
+    factors on the size now by which recordings of that round say that it would have been seen.
     """
 
     candidate: Candidate
@@ -273,6 +275,7 @@ class _Size:
     value: float
     rest: tuple[float, ...]
     factor: float = 1.0
+    before: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, candidate: Candidate, config: Config) -> _Size:
@@ -285,7 +288,10 @@ class _Size:
         values = (self.value, *self.rest)
         return self.candidate.applied(declared, self.candidate.scaled(values))
 
-    def change_by(self, factor: float) -> None:
+    def change_by(self, factors: Sequence[float], counted: Sequence[float]) -> None:
+        """Take the size that most would have been seen at, by the factors that are `counted`."""
+        factor = float(np.quantile(counted, _SEEN))
+        self.before = tuple(one / factor for one in factors)
         wanted = self._changed(factor)
         self.factor = factor if self._is_physical(wanted) else math.inf
         self.value = wanted

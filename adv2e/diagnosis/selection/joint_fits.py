@@ -14,16 +14,13 @@ from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.fitted import Fitted, parted
 from adv2e.diagnosis.hints.readouts import EXPOSURE
 from adv2e.diagnosis.selection.acceptance import BORDER, BY_CHANCE, objections, ranked
-from adv2e.diagnosis.selection.reference import Reference, State
+from adv2e.diagnosis.selection.reference import CATCHES_UP, Reference, State
 from adv2e.diagnosis.selection.shortlist import Trial
 from adv2e.diagnosis.statistics.summary import BOTH
 
 Array = NDArray[np.float64]
 
 _TRIED = 4
-CATCHES_UP = 60.0
-"""Log likelihood that a fit may gain when it is brought to its end."""
-
 _PAIRS = 4
 _MOST_LEFT = 0.5
 """Part of what the best effect alone would leave that two may, to be worth a fit."""
@@ -96,7 +93,8 @@ def with_more(
     for trial in added:
         before = tuple(_exposed_as(trial, fit) for fit in before)
     together = (*before, *(trial.fit for trial in added))
-    joint = reference.fitted(together, added[0].ensembles[splits.TRAIN].sd, splits.TRAIN)
+    sd = reference.tried(added[0].fit.config)[splits.TRAIN].sd
+    joint = reference.fitted(together, sd, splits.TRAIN)
     grown = State(joint.config, parted(joint, together), reference.tried(joint.config))
     each = (objections(joint, grown, ground, reference) for ground in grounds)
     against = next(filter(None, each), [])

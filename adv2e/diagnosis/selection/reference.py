@@ -24,13 +24,16 @@ Array = NDArray[np.float64]
 
 MANY, SOME = 100, 32
 """Simulations of a model that is kept, and of one that is tried."""
+CATCHES_UP = 60.0
+"""Log likelihood that a fit may gain when it is brought to its end."""
 FURTHER = range(1001, 2001)
 """Seeds of those that tell how often chance makes what none of the many did."""
 
 _OF_SCALES, _OF_MODELS, OF_RECORDINGS, _OF_SHIFTED = 1, 2, 3, 4
 """Purposes of simulations, as random streams: each draws frame errors of its own."""
-_SEEDS = 6
-_LAST_ROUNDS = [range(first, first + _SEEDS) for first in range(21, 57, _SEEDS)]
+_SEEDS = 4
+"""Of one step of a fit; the last ones make a mean over twelve simulations."""
+_LAST_ROUNDS = [range(first, first + _SEEDS) for first in range(21, 21 + 6 * _SEEDS, _SEEDS)]
 _ROUNDS = 4
 _SETTLED = 0.25  # deviations
 _REACH = 0.4

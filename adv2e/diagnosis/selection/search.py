@@ -23,7 +23,6 @@ from adv2e.diagnosis.fitting.candidates import Candidate
 from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.selection.acceptance import BY_FRAMES, CLOSE, gain, gain_held_out, stands_out
 from adv2e.diagnosis.selection.joint_fits import (
-    CATCHES_UP,
     JointFit,
     best_of,
     count_parameters,
@@ -31,7 +30,7 @@ from adv2e.diagnosis.selection.joint_fits import (
     with_more,
     with_one_more,
 )
-from adv2e.diagnosis.selection.reference import Reference, State
+from adv2e.diagnosis.selection.reference import CATCHES_UP, Reference, State
 from adv2e.diagnosis.selection.shortlist import Trial, best_forms, scored, shortlisted
 from adv2e.diagnosis.statistics.summary import BOTH
 from adv2e.reports.result import Rejected
@@ -173,7 +172,8 @@ class Search:
         """Tell whether a trial gains in log likelihood on the data for validation."""
         view, reference = splits.VALIDATION, self.reference
         before = reference.tried(self.declared.config, trial.fit.config)[view]
-        return gain(trial.ensembles[view], before, reference.observed[view]) > 0.0
+        after = reference.tried(trial.fit.config)[view]
+        return gain(after, before, reference.observed[view]) > 0.0
 
     def _forward(self, state: State) -> State:
         """Return the model with effects more, until nothing is left or nothing holds.

@@ -10,7 +10,7 @@ from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.fitting.candidates import Candidate
 from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.hints.readouts import EXPOSURE
-from adv2e.diagnosis.selection.reference import SOME, Reference, State
+from adv2e.diagnosis.selection.reference import CATCHES_UP, SOME, Reference, State
 from adv2e.diagnosis.statistics.metric import Ensemble
 from adv2e.diagnosis.statistics.summary import BOTH
 
@@ -18,6 +18,9 @@ _LONGEST = 6
 _FORMS = 2
 """Of them, forms of one effect: a third kept others out that are missing together with it."""
 _FAR = 2.0
+FEW, _CERTAIN = 8, 4.0
+"""Simulations of every trial, and deviations of chance by which it is then too far behind the first
+to be simulated more often: whoever needs it later, does that."""
 
 
 @dataclass(frozen=True)
@@ -66,13 +69,8 @@ def shortlisted(reference: Reference, state: State, candidates: Sequence[Candida
     dropped = [fit for fit in fits if not any(fit is one for one in chosen)] + dropped
     fits = chosen + of_chance
     reference.fitter(splits.TRAIN, state.config).improve(fits, (3, 4, 5))
-    configs = [fit.config for fit in fits]
-    sample = reference.sampler.samples(configs, range(1, SOME + 1))
-    trials = [
-        Trial(fit, ensembles, scored(reference, ensembles, len(fit.candidate.parameters)))
-        for fit, ensembles in zip(fits, map(reference.ensembles, configs, sample), strict=True)
-    ]
-    trials.sort(key=lambda trial: -trial.score)
+    near, others = _halved(reference, _simulated(reference, fits, FEW))
+    trials = _simulated(reference, [trial.fit for trial in near], SOME) + others
     reference.rejections.new_round()
     for trial in trials:
         reference.log(f"  {trial.name} {trial.fit.settings}: score {trial.score:.0f}")
@@ -82,6 +80,31 @@ def shortlisted(reference: Reference, state: State, candidates: Sequence[Candida
         why = f"explains {share:.0%} of the difference, others explain more"
         reference.rejections.add(fit, why if share >= 0.005 else "explains nothing")
     return trials
+
+
+def _simulated(reference: Reference, fits: Sequence[Fitted], seeds: int) -> list[Trial]:
+    """Return fits simulated so many times, the best first."""
+    configs = [fit.config for fit in fits]
+    sample = reference.sampler.samples(configs, range(1, seeds + 1))
+    trials = [
+        Trial(fit, ensembles, scored(reference, ensembles, len(fit.candidate.parameters)))
+        for fit, ensembles in zip(fits, map(reference.ensembles, configs, sample), strict=True)
+    ]
+    return sorted(trials, key=lambda trial: -trial.score)
+
+
+def _halved(reference: Reference, trials: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
+    """Return the trials that more simulations may put first, and those that they cannot."""
+    observed = reference.observed[BOTH]
+
+    def is_behind(trial: Trial) -> bool:
+        chance = trial.ensembles[BOTH].parted_by_chance(trials[0].ensembles[BOTH], observed)
+        far = trials[0].score - trial.score > CATCHES_UP + _CERTAIN * chance
+        return far and not trial.fit.candidate.of_chance
+
+    behind = list(map(is_behind, trials))
+    near = [trial for trial, out in zip(trials, behind, strict=True) if not out]
+    return near, [trial for trial, out in zip(trials, behind, strict=True) if out]
 
 
 def best_forms(trials: Sequence[Trial]) -> list[Trial]:

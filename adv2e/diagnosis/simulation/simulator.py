@@ -121,13 +121,14 @@ _KEPT = 4
 """Ways to make frames of which they are kept: those tried one beside another."""
 
 
+_Held = dict[Any, tuple[threading.Lock, list[Instants]]]
+
+
 class FrameCache:
     """Frames of a recording, read and made once for each way to do that; for many threads."""
 
     def __init__(self) -> None:
-        self._made: dict[Any, Instants] = {}
-        self._moved: dict[Any, Instants] = {}
-        self._lock = threading.Lock()
+        self._made, self._moved, self._lock = _Held(), _Held(), threading.Lock()
 
     def of(self, config: Config, read: Callable[[], Instants]) -> Instants:
         """Return the frames, as `read` does, and what is :func:`made` of them where that is done.
@@ -140,23 +141,29 @@ class FrameCache:
         key, acting = (frames.encoding, frames.full_scale, how), _until_moved(config)
 
         def in_place() -> Instants:
-            return _held(self._made, key, lambda: made(config, *read()) if once else read())
+            return self._of(self._made, key, lambda: made(config, *read()) if once else read())
 
         def moved() -> Instants:
             times_ns, light = in_place()
             return times_ns, _after(acting, config, times_ns, light)
 
+        return self._of(self._moved, (key, acting), moved) if _is_moved(config) else in_place()
+
+    def _of(self, held: _Held, key: Any, make: Callable[[], Instants]) -> Instants:
+        """Return the cached value of a key, made by `make` if there is none.
+
+        The oldest are dropped.  Who asks for another key does not wait for this one.
+        """
         with self._lock:
-            return _held(self._moved, (key, acting), moved) if _is_moved(config) else in_place()
-
-
-def _held(held: dict[Any, Instants], key: Any, make: Callable[[], Instants]) -> Instants:
-    """Return the cached value of a key, made by `make` if there is none; the oldest are dropped."""
-    found = held.pop(key, None) or make()
-    while len(held) >= _KEPT:
-        del held[next(iter(held))]
-    held[key] = found
-    return found
+            found = held.pop(key, None) or (threading.Lock(), [])
+            while len(held) >= _KEPT:
+                del held[next(iter(held))]
+            held[key] = found
+        making, value = found
+        with making:
+            if not value:
+                value.append(make())
+        return value[0]
 
 
 def events_of(

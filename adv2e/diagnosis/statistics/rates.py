@@ -212,65 +212,67 @@ def since_burst(period_us: float, begins_us: float) -> Group:
 
 # ---- Sums over the events of a stream, compiled: they run beside simulations without the lock.
 #
-# Arguments in common: time [us], pixel, polarity and part of each event; `times`, (frames,) [us];
-# `lags`, (lags,) [us]; `slope`, (pixels, frames - 1), all of a pixel side by side, as the lags of
-# an event lie close to one another; `at`, (lags,) zeros, room for where in `times` each lag is.
+# Arguments in common: time [us], pixel, polarity and part of each event; `times`, (frames,), and
+# `lags` [us]; `slope`, (frames - 1, pixels).  Some events look at few frames, which stay in cache:
+# at those of one lag after another, and then come the next events.
+
+_EVENTS = 2048
 
 
 @kernel
-def _interval(t: int, lag: float, times: Any, k: int) -> int:
-    """Return the frame interval that lies `lag` before a time [us], the k-th or a later one."""
-    while k < times.shape[0] - 2 and t >= times[k + 1] + lag:
-        k += 1
-    return k
+def _frame_of(t: int, lag: float, times: Any, f: int) -> int:
+    """Return the frame interval that lies `lag` before a time [us], the f-th or a later one."""
+    while f < times.shape[0] - 2 and t >= times[f + 1] + lag:
+        f += 1
+    return f
+
+
+@kernel
+def _end_of(f: int, lag: float, times: Any) -> float:
+    """Return the time before which events look at a frame interval [us]."""
+    return times[f + 1] + lag if f < times.shape[0] - 2 else np.inf
 
 
 @kernel
 def sum_slopes(
-    t: Any, pixel: Any, on: Any, cell: Any, times: Any, lags: Any, slope: Any, at: Any, sums: Any
+    t: Any, pixel: Any, on: Any, cell: Any, times: Any, lags: Any, slope: Any, sums: Any
 ) -> None:
     """Add up the change of light some time before each event, in the event's direction.
 
     `cell`: (events,) column of `sums`, (lags, cells), that the event counts for.
     """
-    for i in range(t.shape[0]):
-        n, c = pixel[i], cell[i]
-        sign = 1.0 if on[i] else -1.0
+    at = np.zeros(lags.shape[0], np.int64)
+    for begin in range(0, t.shape[0], _EVENTS):
+        stop = min(begin + _EVENTS, t.shape[0])
         for j in range(lags.shape[0]):
-            k = _interval(t[i], lags[j], times, at[j])
-            at[j] = k
-            sums[j, c] += sign * slope[n, k]
+            i, f, own = begin, at[j], sums[j]
+            while i < stop:
+                f = _frame_of(t[i], lags[j], times, f)
+                end, now = _end_of(f, lags[j], times), slope[f]
+                while i < stop and t[i] < end:
+                    own[cell[i]] += now[pixel[i]] if on[i] else -now[pixel[i]]
+                    i += 1
+            at[j] = f
 
 
 @kernel
 def sum_slopes_beside(
-    t: Any,
-    pixel: Any,
-    on: Any,
-    part: Any,
-    width: int,
-    height: int,
-    times: Any,
-    lags: Any,
-    slope: Any,
-    at: Any,
-    sums: Any,
+    t: Any, pixel: Any, on: Any, part: Any, width: int, times: Any, lags: Any, slope: Any, sums: Any
 ) -> None:
     """Add up the change of light right of each event less that left of it, and below less above.
 
-    `sums`: (2 lags, parts), right and below in turn.  Events of the border do not count.
+    `sums`: (2 lags, parts), right and below in turn.  No event is at the border.
     """
-    for i in range(t.shape[0]):
-        n = pixel[i]
-        x, y = n % width, n // width
-        inside = x > 0 and y > 0 and x < width - 1 and y < height - 1
-        sign = 1.0 if on[i] else -1.0
-        for j in range(lags.shape[0]):
-            k = _interval(t[i], lags[j], times, at[j])
-            at[j] = k
-            if inside:
-                sums[2 * j, part[i]] += sign * (slope[n + 1, k] - slope[n - 1, k])
-                sums[2 * j + 1, part[i]] += sign * (slope[n + width, k] - slope[n - width, k])
+    for j in range(lags.shape[0]):
+        i, f, right, below = 0, 0, sums[2 * j], sums[2 * j + 1]
+        while i < t.shape[0]:
+            f = _frame_of(t[i], lags[j], times, f)
+            end, now = _end_of(f, lags[j], times), slope[f]
+            while i < t.shape[0] and t[i] < end:
+                n, p, sign = pixel[i], part[i], 1.0 if on[i] else -1.0
+                right[p] += sign * (now[n + 1] - now[n - 1])
+                below[p] += sign * (now[n + width] - now[n - width])
+                i += 1
 
 
 @kernel
@@ -298,26 +300,37 @@ def count_gaps(
 
 
 @kernel
-def since_neighbours(t: Any, pixel: Any, on: Any, width: int, last: Any, since: Any) -> None:
-    """Compute the time since the latest event of the four neighbouring pixels, into `since`.
+def count_neighbours(
+    t: Any, pixel: Any, on: Any, part: Any, width: int, borders: Any, last: Any, number: Any
+) -> None:
+    """Count the times since the latest event of the four neighbouring pixels.
 
-    `last`, (pixels, 2): time of the latest event of each pixel and polarity [us], long ago at
-    first; `since`, (events, 2): time since an event of the other, and of the same, polarity [us].
+    `last`, (pixels + 2 width, 2): time of the latest event of each pixel and polarity [us], long
+    ago at first, as in the row above and below the sensor; `number`, (parts, 2, borders + 1): after
+    an event of the other, and of the same, polarity.
     """
-    pixels = last.shape[0]
     for k in range(t.shape[0]):
-        i = pixel[k]
-        column = i % width
+        i, p = width + pixel[k], on[k]
+        left, right = pixel[k] % width > 0, pixel[k] % width < width - 1
         for same in range(2):
-            p = on[k] if same else 1 - on[k]
-            latest = np.int64(-(1 << 60))
-            if column > 0:
-                latest = max(latest, last[i - 1, p])
-            if column < width - 1:
-                latest = max(latest, last[i + 1, p])
-            if i >= width:
-                latest = max(latest, last[i - width, p])
-            if i + width < pixels:
-                latest = max(latest, last[i + width, p])
-            since[k, same] = t[k] - latest
-        last[i, on[k]] = t[k]
+            q = p if same else 1 - p
+            latest = max(last[i - width, q], last[i + width, q])
+            if left:
+                latest = max(latest, last[i - 1, q])
+            if right:
+                latest = max(latest, last[i + 1, q])
+            gap, bin_ = t[k] - latest, np.int64(0)
+            while bin_ < borders.shape[0] and gap >= borders[bin_]:
+                bin_ += 1
+            number[part[k], same, bin_] += 1.0
+        last[i, p] = t[k]
+
+
+@kernel
+def find_places(begins: Any, before: Any, places: Any) -> None:
+    """Compute the place of each event in its run, from 0, into `places`.
+
+    `begins`: whether it is the first; `before`: the event before it in its pixel.
+    """
+    for k in range(begins.shape[0]):
+        places[k] = 0 if begins[k] else places[before[k]] + 1

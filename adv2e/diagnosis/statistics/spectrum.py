@@ -59,7 +59,7 @@ def spectrum(scene: Scene) -> Group:
 
     def count(placed: Placed) -> Array:
         stream = placed.stream
-        step = np.clip(((stream.t - start) // BIN_US).astype(np.int64), 0, bins - 1)
+        step = np.clip(((stream.t - start) / BIN_US).astype(np.int64), 0, bins - 1)
         signed = counts(placed.part, step, bins, 2.0 * stream.on - 1.0)
         return np.concatenate([counts(placed.part, step, bins), signed], axis=1)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from functools import cached_property
 
@@ -100,9 +100,6 @@ class SummaryStatistics:
             views = [*raw, raw[splits.TRAIN] + raw[splits.VALIDATION]]
             columns.append(np.array([group.values(view) for view in views]))
         return np.concatenate(columns, axis=1)
-
-    def sample(self, streams: Iterable[Stream]) -> Array:
-        return np.array([self.measure(stream) for stream in streams])
 
 
 # ---- Summary statistics of simulations.

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.scene import BRIGHTNESSES, LIGHT_NAMES, STILL, Placed, Scene
@@ -22,7 +22,8 @@ from adv2e.diagnosis.statistics.groups import (
 )
 from adv2e.diagnosis.statistics.rates import (
     count_gaps,
-    since_neighbours,
+    count_neighbours,
+    find_places,
     spans_text,
     sum_slopes,
     sum_slopes_beside,
@@ -32,6 +33,9 @@ from adv2e.reports.quantities import NO_UNIT
 LAGS_MS = (-20.0, -8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 _PAIRS_MS = ((-2.0, 4.0), (-8.0, 16.0))
 _BESIDE_MS = (2.0, 10.0)
+
+
+_SUMMED_MS = tuple(sorted({*LAGS_MS, *np.ravel(_PAIRS_MS).tolist()}))
 
 
 class Slopes:
@@ -44,27 +48,31 @@ class Slopes:
         self.scene = scene
         moving = np.abs(scene.slope[scene.speed > 0])
         typical = max(float(np.median(moving)) if moving.size else 1.0, 1e-6)
-        bounded = scene.slope / (np.abs(scene.slope) + np.float32(typical))
+        self.bounded = scene.slope / (np.abs(scene.slope) + np.float32(typical))
         self.change = f"mean change s of log light, as s/(|s| + {typical:.3g} ln/s),"
-        self.bounded = np.ascontiguousarray(bounded.T)
 
-    def count(
-        self, placed: Placed, cell: NDArray[np.int64], cells: int, lags_ms: Sequence[float]
-    ) -> Array:
-        """Return events, then the change before them in their direction, summed.
+    def sums(self, placed: Placed) -> Array:
+        """Return the change before events in their direction, summed, made once for a stream.
 
-        (parts, cells + lags x cells)
+        At all of `_SUMMED_MS`: (lags, parts, brightnesses, segments).
         """
-        stream = placed.stream
-        lags = 1e3 * np.array(lags_ms)
-        sums = np.zeros((len(lags), splits.COUNT * cells))
-        sum_slopes(
-            stream.t, stream.pixel, stream.on, placed.part * cells + cell,
-            self.scene.times_us, lags, self.bounded, np.zeros(len(lags), np.int64), sums,
-        )  # fmt: skip
-        by_part = sums.reshape(len(lags), splits.COUNT, cells).swapaxes(0, 1)
-        number = counts(placed.part, cell, cells)
-        return np.concatenate([number, by_part.reshape(splits.COUNT, -1)], axis=1)
+        if self not in placed.made:
+            stream, scene = placed.stream, self.scene
+            shape = len(_SUMMED_MS), splits.COUNT, BRIGHTNESSES, scene.split.segments
+            cell = np.ravel_multi_index((placed.part, placed.brightness, placed.segment), shape[1:])
+            sums = np.zeros((len(_SUMMED_MS), math.prod(shape[1:])))
+            sum_slopes(
+                stream.t, stream.pixel, stream.on, cell,
+                scene.times_us, 1e3 * np.array(_SUMMED_MS), self.bounded, sums,
+            )  # fmt: skip
+            placed.made[self] = sums.reshape(shape)
+        return np.asarray(placed.made[self])
+
+
+def _with_sums(number: Array, sums: Array, lags_ms: Sequence[float] | Array) -> Array:
+    """Return numbers of events, then sums at some of the lags, (parts, cells + lags x cells)."""
+    chosen = sums[np.searchsorted(_SUMMED_MS, lags_ms)].swapaxes(0, 1)
+    return np.concatenate([number, chosen.reshape(splits.COUNT, -1)], axis=1)
 
 
 def _when(lag_ms: float) -> str:
@@ -86,7 +94,8 @@ def lag(slopes: Slopes) -> Group:
     ]
 
     def count(placed: Placed) -> Array:
-        return slopes.count(placed, placed.brightness, BRIGHTNESSES, LAGS_MS)
+        number = counts(placed.part, placed.brightness, BRIGHTNESSES)
+        return _with_sums(number, slopes.sums(placed).sum(axis=3), LAGS_MS)
 
     def values(raw: Array) -> Array:
         number, *sums = raw.reshape(-1, BRIGHTNESSES)
@@ -110,7 +119,8 @@ def drift(slopes: Slopes) -> Group:
     ]
 
     def count(placed: Placed) -> Array:
-        return slopes.count(placed, placed.segment, segments, np.ravel(_PAIRS_MS).tolist())
+        number = counts(placed.part, placed.segment, segments)
+        return _with_sums(number, slopes.sums(placed).sum(axis=2), np.ravel(_PAIRS_MS))
 
     def values(raw: Array) -> Array:
         sums = raw[segments:].reshape(len(_PAIRS_MS), 2, segments)
@@ -131,18 +141,20 @@ def shift(slopes: Slopes) -> Group:
         for lag in _BESIDE_MS
         for name, side in (("right", "right of"), ("below", "below"))
     ]
+
     lags = 1e3 * np.array(_BESIDE_MS)
+    y, x = np.mgrid[: slopes.scene.height, : slopes.scene.width]
+    inside = ((x > 0) & (y > 0) & (x < x[0, -1]) & (y < y[-1, 0])).ravel()
 
     def count(placed: Placed) -> Array:
         stream, scene = placed.stream, slopes.scene
-        x, y = stream.pixel % scene.width, stream.pixel // scene.width
-        used = (x > 0) & (y > 0) & (x < scene.width - 1) & (y < scene.height - 1)
-        number = np.bincount(placed.part[used], minlength=splits.COUNT)
-        sums = np.zeros((2 * len(lags), splits.COUNT))
+        used = inside.take(stream.pixel)
+        part, sums = placed.part[used], np.zeros((2 * len(lags), splits.COUNT))
         sum_slopes_beside(
-            stream.t, stream.pixel, stream.on, placed.part, scene.width, scene.height,
-            scene.times_us, lags, slopes.bounded, np.zeros(len(lags), np.int64), sums,
+            stream.t[used], stream.pixel[used], stream.on[used], part,
+            scene.width, scene.times_us, lags, slopes.bounded, sums,
         )  # fmt: skip
+        number = np.bincount(part, minlength=splits.COUNT)
         return np.concatenate([number[:, None], sums.T], axis=1)
 
     def values(raw: Array) -> Array:
@@ -178,7 +190,7 @@ def intervals(*, at_rest: bool = False) -> Group:
     borders_ms, where = (_REST_MS, " at rest") if at_rest else (BORDERS_MS, "")
     borders_us = np.round(np.array(borders_ms) * 1e3).astype(np.int64)
     longest_us = borders_us[-1]
-    bin_of = np.searchsorted(borders_us, np.arange(longest_us + 1), "right")
+    bin_of = np.searchsorted(borders_us, np.arange(longest_us + 1), "right").astype(np.int8)
     entries = numbers(
         (
             (
@@ -218,10 +230,10 @@ def runs() -> Group:
         stream = placed.stream
         gap, on = stream.since, stream.on
         begins = (gap < 0) | (gap > _LONGEST_GAP_US) | (on != stream.on_before)
-        order, index = stream.by_pixel, np.arange(len(stream))
-        start = np.maximum.accumulate(np.where(begins[order], index, 0))
-        place = _PLACE_OF[np.minimum(index - start, 9)]
-        return counts(placed.part[order], place * 2 + on[order], len(entries))
+        places = np.empty(len(stream), np.int64)
+        find_places(begins, stream.before, places)
+        cell = _PLACE_OF[np.minimum(places, len(_PLACE_OF) - 1)] * 2 + on
+        return counts(placed.part, cell, len(entries))
 
     return Group("runs of one polarity", 0.6, entries, count, kind="time")
 
@@ -237,15 +249,16 @@ def neighbours() -> Group:
         for text in _bins_text(_NEIGHBOURS_MS)
     )
     borders_us = np.round(np.array(_NEIGHBOURS_MS) * 1e3).astype(np.int64)
-    bins = len(borders_us) + 1
 
     def count(placed: Placed) -> Array:
         stream = placed.stream
-        since = np.empty((len(stream), 2), np.int64)
-        last = np.full((stream.width * stream.height, 2), -(1 << 60), np.int64)
-        since_neighbours(stream.t, stream.pixel, stream.on, stream.width, last, since)
-        cell = np.searchsorted(borders_us, since, "right")
-        return np.concatenate([counts(placed.part, one, bins) for one in cell.T], axis=1)
+        rows = stream.height + 2
+        last = np.full((stream.width * rows, 2), -(1 << 60), np.int64)
+        number = np.zeros((splits.COUNT, 2, len(borders_us) + 1))
+        count_neighbours(
+            stream.t, stream.pixel, stream.on, placed.part, stream.width, borders_us, last, number
+        )
+        return number.reshape(splits.COUNT, -1)
 
     return Group("neighbouring pixels", 0.6, entries, count, kind="time")
 

@@ -194,7 +194,8 @@ class Pilot:
 
     @cached_property
     def sample(self) -> Array:
-        return self.statistics.sample(self.streams.values())
+        with closing(self.simulator(self.evidence)) as made:
+            return np.array(made.map(self.statistics.measure, self.streams.values()))
 
     @cached_property
     def undisturbed(self) -> Pilot:
@@ -207,8 +208,10 @@ class Pilot:
 
     def change(self, evidence: Evidence) -> Change:
         """Return the change of the statistics with the frames of `evidence`, by the same seeds."""
-        less = self.statistics.sample(self._simulated(evidence, self.declared))
-        return Change.of(self.sample, less, self.statistics.titles, self.statistics.least)
+        measure, declared = self.statistics.measure, self.declared
+        with closing(self.simulator(evidence)) as made:
+            less = made.map(lambda seed: measure(made.stream(declared, seed)), self.streams)
+        return Change.of(self.sample, np.array(less), self.statistics.titles, self.statistics.least)
 
     def _simulated(self, evidence: Evidence, config: Config) -> list[Stream]:
         with closing(self.simulator(evidence)) as made:

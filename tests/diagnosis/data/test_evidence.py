@@ -109,9 +109,9 @@ def test_a_part_that_cannot_be_is_refused(adv2e, record, words, said):
 
 
 def test_how_far_a_diagnosis_is_tells_its_stage_and_an_estimate():
-    told = how_far("searching", 650, 60.0)
+    told = how_far("searching", 600, 60.0)
     assert (
-        told == "searching: 650 simulations in 60 s; about 60 s more where one effect explains all"
+        told == "searching: 600 simulations in 60 s; about 60 s more where one effect explains all"
     )
     assert "takes longer" in how_far("searching", 5000, 600.0)
     assert how_far("reading", 0, 31.0) == "reading: 0 simulations in 31 s"

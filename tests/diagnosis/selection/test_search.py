@@ -84,7 +84,7 @@ def test_below_the_floor_there_is_nothing_to_explain(monkeypatch, before, after,
     misfits = {id(search.declared): before, id(outcome.state): after}
 
     def misfit(reference, state, view=BOTH):
-        return floor - 3.0 + misfits[id(state)]
+        return floor + (misfits[id(state)] - 3.0)
 
     monkeypatch.setattr(type(search.reference), "misfit", misfit)
     assert search.explained(outcome.state) == pytest.approx(share)

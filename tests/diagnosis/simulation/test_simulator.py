@@ -1,5 +1,7 @@
 """Simulations of a recording's own frames: the same for any number of threads, and bounded."""
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +15,7 @@ from adv2e.diagnosis.configurations import with_keys
 from adv2e.diagnosis.data.evidence import Evidence, RunIn
 from adv2e.diagnosis.data.scene import Scene
 from adv2e.diagnosis.hints.lamps import lamps_of
-from adv2e.diagnosis.simulation.simulator import Simulator
+from adv2e.diagnosis.simulation.simulator import FrameCache, Simulator
 from adv2e.diagnosis.statistics.summary import Sampler, SummaryStatistics
 from adv2e.effects.frames.misregistration import shifted
 from adv2e.light.interpolation import make_upsampler
@@ -265,6 +267,28 @@ def test_frames_are_made_sharp_once_and_the_same(monkeypatch):
     assert not np.array_equal(simulator.stream(blurred, 5).t, whole["t"])
     assert made.count(15000.0) == 1
     simulator.close()
+
+
+def test_frames_that_are_being_made_keep_no_others_waiting():
+    """The first ones are ready only once others, asked for later, are."""
+    cache, others_made = FrameCache(), threading.Event()
+    instants = [0, 10_000_000], np.ones((2, 3, 4), np.float32)
+
+    def wait_for_others():
+        assert others_made.wait(20.0)
+        return instants
+
+    def make_others():
+        others_made.set()
+        return instants
+
+    one, other = (load_config([], [f"frames.encoding={name}"]) for name in ("linear", "srgb"))
+    with ThreadPoolExecutor(2) as pool:
+        first = pool.submit(cache.of, one, wait_for_others)
+        second = pool.submit(cache.of, other, make_others)
+        assert first.result() is second.result() is instants
+    others_made.clear()
+    assert cache.of(one, wait_for_others) is instants  # it is not made again
 
 
 @pytest.mark.parametrize(

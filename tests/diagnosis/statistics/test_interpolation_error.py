@@ -53,7 +53,7 @@ def test_simulations_without_the_bias_are_nearer_to_a_camera(tmp_path):
         Pilot(evidence, declared, statistics, streams, lambda fewer: Simulator(fewer, 2))
     )
     simulator.close()
-    sample = statistics.sample(streams.values())[:, BOTH]
+    sample = np.array([statistics.measure(stream) for stream in streams.values()])[:, BOTH]
     apart = Apart.of(recorded.measured(statistics), sample, error, statistics.least)
     before, after = apart.squares()
     assert before > 0.5
