@@ -22,7 +22,7 @@ LIMITS = {
     "batches": 1350,
     "cli": 1290,
     "comparison": 710,
-    "compilation": 235,
+    "compilation": 240,
     "config": 1300,
     "conversion": 1180,
     "diagnosis": 6780,

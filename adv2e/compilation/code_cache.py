@@ -58,6 +58,7 @@ class CodeCache:
         self._holds = threading.RLock()
         self._depth = 0
         self._noted: dict[Path, tuple[int, int]] = {}
+        self._checked: set[str] = set()
         for base in _bases():
             wrong = self._open(base / "adv2e", base / "adv2e" / name)
             if not wrong:
@@ -92,9 +93,13 @@ class CodeCache:
     def lock(self) -> None:
         """Wait until no other thread or process writes here."""
         self._holds.acquire()
+        try:
+            if self._file is not None and self._depth == 0:
+                lock_file(self._file, wait=True)
+        except BaseException:
+            self._holds.release()
+            raise
         self._depth += 1
-        if self._file is not None and self._depth == 1:
-            lock_file(self._file, wait=True)
 
     def unlock(self) -> None:
         """Let others write, once for each :meth:`lock`."""
@@ -118,6 +123,7 @@ class CodeCache:
                 self._is_new(path)
                 if listed.get(file) != _digest(path):
                     path.unlink()
+            self._checked.add(name)
         except OSError:
             return None
         finally:
@@ -125,8 +131,11 @@ class CodeCache:
         return folder
 
     def note_files(self, name: str) -> None:
-        """Add to a manifest what came or changed since this process looked, under the lock."""
-        if self.folder is None:
+        """Add to a manifest what came or changed since this process looked, under the lock.
+
+        Where it never looked, there may be files that nobody vouches for.
+        """
+        if self.folder is None or name not in self._checked:
             return
         folder = self.folder / name
         with suppress(OSError):  # what is not listed is compiled again
@@ -159,7 +168,7 @@ def _code(folder: Path) -> dict[str, Path]:
     """Return each file of a function's code, by its name below `folder`; Numba makes one there."""
     return {
         path.relative_to(folder).as_posix(): path
-        for path in folder.glob("*/**/*")
+        for path in folder.glob("*/**/*.nb[ci]")
         if path.is_file()
     }
 

@@ -361,6 +361,8 @@ class Sink:
     def write_events(self, events: Events) -> None:
         """Append events; over all calls they are sorted by time.
 
+        The array is not changed afterwards: threads may still read it.
+
         Raises
         ------
         OutputError

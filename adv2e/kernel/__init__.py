@@ -7,8 +7,9 @@ Three solvers, each a strip of pixels at a time through all intervals:
                     and ``static_pixels`` a strip at rest in closed form
 ``unfiltered``      no filter, leak or noise of the photoreceptor: the next frame shows which
                     pixels may fire, and these go through the instants before it
-``stepped``         everything else, in steps of time: the K-step forms, no low-pass but leak, the
-                    last interval as printed, slew limit, and what acts on the pixels from outside
+``stepped``         everything else, in steps of time: the K-step forms, no low-pass but leak,
+                    noise, drift or a second pole, the last interval as printed, slew limit, and
+                    what acts on the pixels from outside
 
 and what they share:
 

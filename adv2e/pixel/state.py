@@ -213,7 +213,7 @@ def make_circuit(
 
 
 def driver_of(pixel: Pixel, circuit: Circuit, inside: Sequence[Hooks], method: str) -> str:
-    """Return the name of the compiled function that advances pixels with effects inside them."""
+    """Return the name of the solver of pixels with effects inside them: exact, or in steps."""
     if method not in METHODS:
         raise UsageError(f"method: must be one of {', '.join(METHODS)}, got {method!r}")
     steps = method == "stepped" or bool(inside) or not covers(circuit)

@@ -220,6 +220,9 @@ def convert(spec: dict[str, Any]) -> dict[str, Any]:
     from adv2e.cli import main  # noqa: PLC0415 - in the process that is measured
 
     printed = io.StringIO()
+    program = importlib.import_module("adv2e.__main__")
+    if hasattr(program, "collect_seldom"):  # older ones do so in their command line
+        program.collect_seldom()
 
     def run() -> Any:
         try:

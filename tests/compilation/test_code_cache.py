@@ -5,6 +5,7 @@ import shutil
 import stat
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -163,3 +164,28 @@ def test_folders_that_nobody_used_for_a_month_are_removed(base):
     kept = ["kernels-in-use", "kernels-mine", "kernels-new", "others"]
     assert sorted(path.name for path in base.iterdir()) == kept
     assert (mine / "used").stat().st_mtime > now - day
+
+
+def test_nobody_vouches_for_code_that_was_not_looked_at(base):
+    """A process that keeps one form of a function has not looked at the files of the other."""
+    planted = CodeCache("kernels-1").folder / "parts" / "f" / "index" / "f.nbc"
+    planted.parent.mkdir(parents=True)
+    planted.write_bytes(b"not ours")
+    cache = CodeCache("kernels-1")
+    cache.note_files("parts/f")
+    cache.checked("parts/f")
+    assert not planted.exists()
+
+
+def test_the_lock_is_free_again_where_waiting_for_it_ended_early(base, monkeypatch):
+    cache = CodeCache("kernels-1")
+
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("adv2e.compilation.code_cache.lock_file", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            cache.lock()
+    with ThreadPoolExecutor() as pool:
+        pool.submit(cache.lock).result(timeout=10)

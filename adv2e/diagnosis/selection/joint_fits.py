@@ -77,7 +77,7 @@ def with_one_more(
     """
     made: list[JointFit] = []
     for trial in trials[:_TRIED]:
-        close = trial.score > trials[0].score - CATCHES_UP
+        close = not trial.is_behind and trial.score > trials[0].score - CATCHES_UP
         if not close and any(not one.objections for one in made):
             break
         made.append(with_more(reference, state, [trial], grounds))
@@ -154,7 +154,8 @@ def likely_pairs(
     ground, observed = state.ensembles[splits.TRAIN], reference.observed[splits.TRAIN]
     white = ground.scale.whitening / ground.sd
     missing = white @ (ground.scale.of_values(observed) - ground.mean)
-    changes = [white @ (trial.ensembles[splits.TRAIN].mean - ground.mean) for trial in trials]
+    tried = [reference.tried(trial.fit.config)[splits.TRAIN] for trial in trials]
+    changes = [white @ (one.mean - ground.mean) for one in tried]
     alone = min((_left(missing, [one]) for one in changes), default=0.0)
     found = []
     for a, b in combinations(range(len(trials)), 2):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from adv2e.config import Config
 from adv2e.diagnosis.data import splits
@@ -30,6 +30,8 @@ class Trial:
     fit: Fitted
     ensembles: tuple[Ensemble, ...]
     score: float
+    is_behind: bool = False
+    """Whether it is far behind others: simulated less often, so that scores do not compare."""
 
     @property
     def name(self) -> str:
@@ -73,7 +75,8 @@ def shortlisted(reference: Reference, state: State, candidates: Sequence[Candida
     trials = _simulated(reference, [trial.fit for trial in near], SOME) + others
     reference.rejections.new_round()
     for trial in trials:
-        reference.log(f"  {trial.name} {trial.fit.settings}: score {trial.score:.0f}")
+        behind = ", far behind" if trial.is_behind else ""
+        reference.log(f"  {trial.name} {trial.fit.settings}: score {trial.score:.0f}{behind}")
         reference.rejections.add(trial.fit, "others explain more")
     for fit in dropped:
         share = 1.0 - fit.misfit / nothing
@@ -104,7 +107,7 @@ def _halved(reference: Reference, trials: Sequence[Trial]) -> tuple[list[Trial],
 
     behind = list(map(is_behind, trials))
     near = [trial for trial, out in zip(trials, behind, strict=True) if not out]
-    return near, [trial for trial, out in zip(trials, behind, strict=True) if out]
+    return near, [replace(t, is_behind=True) for t, out in zip(trials, behind, strict=True) if out]
 
 
 def best_forms(trials: Sequence[Trial]) -> list[Trial]:
