@@ -2,7 +2,8 @@
 
 A compiled function is a :func:`kernel`; an :func:`inlined` one becomes part of each of its callers.
 The compiler optimises all code below a function with that function, so what is called by one that
-is called by one is compiled three times: those near the top, with one caller, are inlined.
+is called by one is compiled three times: those near the top, with one caller, are inlined.  A
+second process compiles parts that take long (:func:`in_parts`).
 Numba is imported when the first of them is called, as it takes as long as a small conversion:
 what computes nothing, such as ``adv2e info``, does without, and ``adv2e convert`` imports it
 while the input is opened (:func:`import_ahead`).
@@ -24,20 +25,25 @@ import hashlib
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache, update_wrapper
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
+from adv2e.background import default_threads
+from adv2e.compilation.ahead import compiled_beside
 from adv2e.compilation.code_cache import CodeCache
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+Part = tuple[Any, tuple[Any, ...]]
+"""Compiled function, and arguments of the types that it is called with."""
 
 _PACKAGE = Path(__file__).resolve().parent
 _PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 _MAKING = threading.RLock()
+_AHEAD = threading.Lock()
 _EXTENDING = threading.Lock()
 _extensions: list[Callable[[], None]] = []
 _is_imported = threading.Event()
@@ -88,6 +94,7 @@ class Compiled:
         update_wrapper(self, function)
         self.function = function
         self.is_inlined = "inline" in options
+        self.parts: Callable[..., tuple[Sequence[Part], Sequence[Part]]] | None = None
         self._options = options
 
     def __call__(self, *arguments: Any) -> Any:
@@ -121,11 +128,45 @@ def _with_room(function: Compiled, arguments: tuple[Any, ...]) -> Any:
     Python takes memory for its stack in small chunks, and gives each back at once.  The compiler
     goes back and forth over the border of one half a million times.
     """
+    _compile_parts(function, arguments)
     return function.entry(*arguments)
 
 
 # a frame this large gets a chunk of its own, of which the next frames have the rest, some 300 kB
 _with_room.__code__ = _with_room.__code__.replace(co_stacksize=90_000)
+
+
+def in_parts(
+    function: Function, parts: Callable[..., tuple[Sequence[Part], Sequence[Part]]]
+) -> None:
+    """Have parts of a function compiled in two processes, before it is compiled for the first time.
+
+    `parts`, called with its arguments, returns those for a second process, and those for this one:
+    compiled functions, with arguments of the types that they will be called with.
+    """
+    if isinstance(function, Compiled):
+        function.parts = parts
+
+
+def _compile_parts(function: Compiled, arguments: tuple[Any, ...]) -> None:
+    """Compile parts of a function in two processes, if it has such and their code is not kept."""
+    if function.parts is None or default_threads() < 2 or code_cache().folder is None:
+        return
+    compiler = _compiler()
+    with _AHEAD:
+        theirs, ours = function.parts(*arguments)
+        if any(compiler.is_kept(part.function, code_cache()) for part, _ in theirs):
+            return
+        told = [
+            (part.__module__, part.__qualname__, compiler.types_of(samples))
+            for part, samples in theirs
+        ]
+        with compiled_beside(told):
+            for part, samples in ours:
+                part.dispatcher.compile(compiler.types_of(samples))
+        for part, _ in theirs:
+            for one in parts_of(part.function):
+                _tell(one)
 
 
 def _compiler() -> Any:

@@ -18,11 +18,11 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1410,
+    "": 1440,
     "batches": 1350,
     "cli": 1290,
     "comparison": 710,
-    "compilation": 240,
+    "compilation": 290,
     "config": 1300,
     "conversion": 1180,
     "diagnosis": 6780,
@@ -31,7 +31,7 @@ LIMITS = {
     "files": 780,
     "formats": 5055,
     "inspection": 260,
-    "kernel": 4995,
+    "kernel": 5040,
     "light": 865,
     "motion": 350,
     "pixel": 575,
@@ -44,7 +44,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 307
+FILES = 308
 """Most modules of all packages together."""
 
 _SLACK = 60

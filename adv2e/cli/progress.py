@@ -25,6 +25,7 @@ def compilation_told(log: Callable[[str], None] | None, progress: bool) -> Itera
         Show a bar: functions that are compiled, of those that the ones called so far consist of.
     """
     known: set[Callable[..., Any]] = set()
+    done: set[Callable[..., Any]] = set()
     bar: Any = None
     is_said = log is None
 
@@ -40,8 +41,8 @@ def compilation_told(log: Callable[[str], None] | None, progress: bool) -> Itera
             bar = bars.bar(desc="compiling", unit="function")
         known.update(parts)
         if bar is not None:
-            bar.total = len(known)
-            bar.update()
+            done.add(function)
+            bar.total, bar.n = len(known), len(done)
             bar.refresh()
 
     with compiled.watched(told):

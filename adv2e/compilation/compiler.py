@@ -119,6 +119,17 @@ def _folders(function: Callable[..., Any]) -> tuple[str, str]:
     return f"entries/{name}", f"parts/{name}"
 
 
+def is_kept(function: Callable[..., Any], cache: CodeCache) -> bool:
+    """Tell whether the cache has code of a function that compiled functions call."""
+    folder = cache.folder / _folders(function)[1] if cache.folder else None
+    return folder is not None and any(folder.glob("*/*.nbi"))
+
+
+def types_of(arguments: Sequence[Any]) -> tuple[Any, ...]:
+    """Return the types that Numba gives arguments."""
+    return tuple(map(_numba.typeof, arguments))
+
+
 def know_type(of: type[Any]) -> None:
     """Have Numba take an object of a class for its attribute ``dispatcher``."""
 

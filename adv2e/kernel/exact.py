@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import inlined, kernel
+from adv2e.compiled import in_parts, inlined, kernel
 from adv2e.kernel import per_pixel, screen, static_pixels
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.cascade import advance as cascade
@@ -272,3 +272,32 @@ def run_exact(claimed, most, schedule, circuit, rules, plan, state, memory, buff
             break
         n, buffer = _strip(lo, hi - lo, schedule, circuit, rules, plan, state, memory, buffer, n)
     return n, buffer
+
+
+def _parts(claimed, most, schedule, circuit, rules, plan, state, memory, buffer):
+    """Return parts of :func:`run_exact`, for a second process and this one."""
+    own, strip, frames = memory.strip, memory.strip.rows, schedule.frames
+    light, noise = strip[:1], memory.cascade.noise
+    rest = [
+        (static_pixels.go_through, (0, 0, 0, 0, schedule.starts, circuit, state, own, buffer, 0)),
+        (load, (frames, 0, _f(0.0), 0, 0.0, light)),
+        (_open_strip, (0, 0, 0.0, circuit, state, strip, noise)),
+        (_close_strip, (0, 0, 0, circuit, state, strip, noise)),
+        (_rests, (schedule, 0, 0, 0)),
+        (leak_strip, (0, 0, 0.0, circuit, state, own)),
+    ]
+    if plan is None:
+        interval = Interval(0, 0.0, 0.0, 0.0)
+        rule = Rule(*(one[0] for one in rules if one.ndim > 1))
+        lanes = interval, circuit, rule, state, own, buffer, 0
+        ours = [
+            (batch.load, (0, 0, interval, circuit, state, own)),
+            (batch.search, (0, 0, *lanes)),
+            (screen.screen, (strip, *[_f(0.0)] * 5, rule)),
+        ]
+        return [(batch.decide, (0, 0, 0, *lanes))], [*ours, *rest]
+    theirs, ours = cascade.parts(circuit, plan, state, memory, buffer)
+    return theirs, [*ours, *rest]
+
+
+in_parts(run_exact, _parts)

@@ -155,3 +155,16 @@ def advance(lo, count, interval, number, still, circuit, plan, state, memory, bu
             lower_references(lo, 0, count, state, memory.strip)
         cascade.step_on(strip, substeps, still)
     return n, buffer
+
+
+def parts(circuit, plan, state, memory, buffer):
+    """Return parts of :func:`advance`, for a second process and this one."""
+    strip, own, laws = memory.strip, memory.cascade, plan.laws
+    piece = Piece(0.0, 0.0, 0.0, 0.0, 0, plan.places[0, 0], (0.0, 0.0))
+    noise, path = own.noise, own.path
+    theirs = [
+        (photoreceptor.draw, (0, 0, 0, 0, False, circuit, laws, strip.rows, noise)),
+        (noise_path.sample, (0, own.places, 0, 0, 0, circuit, laws.fine[0], noise, path)),
+        (second_look.find_places, (0, piece, circuit, strip, path, own.look)),
+    ]
+    return theirs, [(_solve_alone, (0, 0, piece, circuit, state, memory, buffer, 0))]

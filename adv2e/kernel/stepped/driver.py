@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import inlined, kernel
+from adv2e.compiled import in_parts, inlined, kernel
 from adv2e.kernel import per_pixel, rng
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.comparator import with_room
@@ -339,3 +339,18 @@ def run_stepped(claimed, most, schedule, circuit, run, injected, state, memory, 
                 s, count, schedule, circuit, run, injected, state, memory, buffer, number
             )
     return number, buffer
+
+
+def _parts(claimed, most, schedule, circuit, run, injected, state, memory, buffer):
+    """Return parts of :func:`run_stepped`, for a second process and this one."""
+    step, levels = TimeStep(0, 0, 0.0, 0.0, 0.0, 0.0, (0.0,) * 5), (0.0,) * 4
+    event = 0, 0, step, levels, circuit, injected, state, memory.strip, buffer, 0
+    own = [
+        (_make_step, (0, 0, 0, step, circuit, run, memory)),
+        (_load_x, (schedule, 0, 0, 0, circuit, memory, 0)),
+        (_open, (0, 0, 0, circuit, run, injected, state, memory.strip)),
+    ]
+    return [(events.fire_step, event)], own
+
+
+in_parts(run_stepped, _parts)
