@@ -24,10 +24,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import adv2e
 from adv2e.batches.work import Job, do
 from adv2e.files.workspace import remove_abandoned
-from adv2e.process import signals
+from adv2e.process import python_command, signals
 from adv2e.process.signals import Terminated, stop_on_signals
 from adv2e.process.standard_error import keep_errors_for_ourselves
 
@@ -41,24 +40,10 @@ class EndedError(Exception):
 
 
 def start() -> subprocess.Popen[bytes]:
-    """Begin a process of :func:`serve`, which runs no code of the current folder.
-
-    It looks for modules where this one does, but for the current folder, which stands there as an
-    empty name where Python was given a command or runs at a prompt.
-    """
-    home = str(Path(adv2e.__file__).parents[1])
-    path = [place for place in sys.path if place not in ("", ".")]
-    path += [] if home in path else [home]  # last: nothing in it can stand for another module
-    # until the path is set nothing is imported but `sys`, which is no file
-    code = (
-        f"import sys; sys.path[:] = {path!a}; from adv2e.batches import processes as p; p.serve()"
-    )
-    told = ["-X", f"utf8={sys.flags.utf8_mode}"]  # or it would write names in other bytes
-    told += ["-I"] if sys.flags.isolated else []
+    """Begin a process of :func:`serve`, which runs no code of the current folder."""
+    code = "from adv2e.batches import processes as p; p.serve()"
     return subprocess.Popen(
-        [sys.executable, *told, "-c", code, str(os.getpid())],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
+        python_command(code, str(os.getpid())), stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
 
 

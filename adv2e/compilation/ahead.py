@@ -15,10 +15,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from adv2e.process import python_command
+
 Part = tuple[str, str, tuple[Any, ...]]
 """Module and name of a compiled function, and types of its arguments."""
-
-_HOME = str(Path(__file__).resolve().parents[2])
 
 
 @contextmanager
@@ -40,14 +40,9 @@ def _started(told: bytes) -> subprocess.Popen[bytes] | None:
     """Return the process that compiles; None: it could not be started."""
     if "python" not in Path(sys.executable or "").name.lower():
         return None  # a program that holds Python: to start it may do anything
-    path = [place for place in sys.path if place not in ("", ".")]
-    path += [] if _HOME in path else [_HOME]  # last: nothing in it can stand for another module
-    # until the path is set nothing is imported but `sys`, which is no file
-    code = f"import sys; sys.path[:] = {path!a}; from adv2e.compilation import ahead; ahead.main()"
-    isolated = ["-I"] if sys.flags.isolated else []
     try:
         process = subprocess.Popen(
-            [sys.executable, *isolated, "-c", code],
+            python_command("from adv2e.compilation import ahead; ahead.main()"),
             stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
     except OSError:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack, closing
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
@@ -207,13 +208,13 @@ class Hdf5Writer(Writer):
         """Take note of a chunk, `begin` events after the first."""
         self.on += int(np.count_nonzero(events["p"]))
         last = events["t"][-1] / 1e6
-        for t_ns, _ in self.frames[len(self._before) :]:
-            t = t_ns / 1e9
-            if t > last:
-                break
-            came_late = self._ends and t <= self._ends[-1]
-            within = 0 if came_late else int(np.searchsorted(events["t"] / 1e6, t))
-            self._before.append(None if came_late else begin + within)
+        waiting = (t_ns / 1e9 for t_ns, _ in self.frames[len(self._before) :])
+        reached = list(takewhile(lambda t: t <= last, waiting))
+        if reached:
+            times = events["t"] / 1e6
+            for t in reached:
+                came_late = self._ends and t <= self._ends[-1]
+                self._before.append(None if came_late else begin + int(np.searchsorted(times, t)))
         self._ends.append(last)
         if self._index is not None:
             self._index.add(begin, self.times_us(events))

@@ -17,13 +17,11 @@ from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.comparator import TIE, fire, with_room
-from adv2e.kernel.inputs import EXACT, Circuit, load
+from adv2e.kernel.inputs import EXACT, Circuit
 from adv2e.kernel.stepped import events, rows
-from adv2e.kernel.stepped.driver import TimeStep
+from adv2e.kernel.stepped.driver import ROOM, TimeStep, load_x
 from adv2e.kernel.stepped.signal import log_of_light
 from adv2e.kernel.work_queue import claim
-
-_ROOM = 64
 
 
 class UnfilteredMemory(NamedTuple):
@@ -59,14 +57,6 @@ def _next_frame(schedule, f, intervals):
         while end < intervals and before[end + 1] == before[f + 1]:
             end += 1
     return end
-
-
-@kernel
-def _load_all(at, lo, count, schedule, circuit, memory, row):
-    """Log intensity of a strip at an instant."""
-    light = memory.light[:count]
-    load(schedule.frames, schedule.before[at], schedule.share[at], lo, 0.0, light)
-    log_of_light(light, circuit, memory.strip[row : row + count])
 
 
 @kernel
@@ -124,7 +114,7 @@ def _fire_some(c, count, lo, step, circuit, injected, state, memory, buffer, num
     """
     injected, state, memory, buffer = borrowed(injected, state, memory, buffer)
     few, levels, alone = memory.few, (1.0, 1.0, 1.0, 1.0), _happens_alone(circuit)
-    while c < count and number + _ROOM <= buffer.keys.shape[0]:
+    while c < count and number + ROOM <= buffer.keys.shape[0]:
         j = memory.hits[c]
         rise = few[rows.SIGNAL1 + j] - few[rows.SIGNAL0 + j]
         few[rows.SLOPE0 + j] = few[rows.SLOPE1 + j] = few[rows.MOVE + j] = rise
@@ -162,7 +152,7 @@ def _go_through(lo, m, f, end, schedule, circuit, injected, state, memory, buffe
         c = np.int64(0)
         count = _may_fire(m, rows.SIGNAL1, starts[s] + length, few, memory.hits)
         while c < count:
-            buffer = with_room(buffer, number, number + _ROOM)
+            buffer = with_room(buffer, number, number + ROOM)
             c, number = _fire_some(
                 c, count, lo, step, circuit, injected, state, memory, buffer, number
             )
@@ -180,11 +170,11 @@ def _strip(lo, count, schedule, circuit, injected, state, memory, buffer, number
     for k in range(count):
         strip[rows.REFERENCE + k] = state[per_pixel.REFERENCE, lo + k]
         events.watch(k, lo + k, circuit, injected, state, strip)
-    _load_all(0, lo, count, schedule, circuit, memory, rows.XA)
+    load_x(schedule, 0, lo, count, circuit, memory, rows.XA)
     f, intervals = np.int64(0), starts.shape[0] - 1
     while f < intervals:
         end = _next_frame(schedule, f, intervals)
-        _load_all(end, lo, count, schedule, circuit, memory, rows.XB)
+        load_x(schedule, end, lo, count, circuit, memory, rows.XB)
         m = _may_fire(count, rows.XB, starts[end] + 1.0, strip, memory.pixels)
         if m > 0:
             number, buffer = _go_through(

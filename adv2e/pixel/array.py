@@ -38,6 +38,13 @@ _LARGEST_SIDE = 1 << 16
 _TILE = 16 * STRIP
 """Pixels of the largest tiles; their events are held twice for a moment."""
 
+_SOLVERS: dict[str, tuple[Any, Callable[[], Any]]] = {
+    "run_exact": (exact.run_exact, exact.new_memory),
+    "run_unfiltered": (unfiltered.run_unfiltered, unfiltered.new_memory),
+    "run_stepped": (driver.run_stepped, driver.new_memory),
+}
+"""Compiled function, and what makes its memory, by the name of the function."""
+
 
 class _Worker:
     """Memory that one thread works with."""
@@ -113,18 +120,12 @@ class PixelArray:
         self._drift_per_s = pixel.thresholds.drift_per_s
         self._level = min(pixel.thresholds.on, pixel.thresholds.off)
         self._start = start = self._relative(t_ns)
-        self._advance: Any = exact.run_exact
-        self._stepping: Stepping | None = None
-        new_memory: Callable[[], Any] = exact.new_memory
-        if driver_of(pixel, self.circuit, inside, method) == "run_stepped":
-            self._advance, new_memory = driver.run_stepped, driver.new_memory
-            bare = method == "auto" and not inside and self._drift_per_s == 0.0
-            if bare and unfiltered.covers(self.circuit):
-                self._advance, new_memory = unfiltered.run_unfiltered, unfiltered.new_memory
-            self._stepping = Stepping(
-                self.circuit, self.pixels, self.columns, inside, pixel.thresholds.drift_per_s,
-                self.origin_us, start, coarseness,
-            )  # fmt: skip
+        name = driver_of(pixel, self.circuit, inside, method)
+        self._advance, new_memory = _SOLVERS[name]
+        self._stepping = None if name == "run_exact" else Stepping(
+            self.circuit, self.pixels, self.columns, inside, self._drift_per_s, self.origin_us,
+            start, coarseness,
+        )  # fmt: skip
         light = first.reshape(-1)
         self.state = initial_state(pixel, self.circuit, light, start, self._stepping, self.threads)
         strips = -(-self.pixels // STRIP)

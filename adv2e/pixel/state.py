@@ -20,8 +20,7 @@ from adv2e.effects.pixel.low_pass import UPDATES
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
 from adv2e.effects.pixel.thresholds import FLOOR
 from adv2e.errors import UsageError
-from adv2e.kernel import per_pixel, rng
-from adv2e.kernel.exact import covers
+from adv2e.kernel import exact, per_pixel, rng, unfiltered
 from adv2e.kernel.inputs import Circuit
 from adv2e.kernel.leak import fill_first_factors, fill_running
 from adv2e.kernel.noise import (
@@ -213,8 +212,12 @@ def make_circuit(
 
 
 def driver_of(pixel: Pixel, circuit: Circuit, inside: Sequence[Hooks], method: str) -> str:
-    """Return the name of the solver of pixels with effects inside them: exact, or in steps."""
+    """Return the name of the compiled function that advances pixels with effects inside them."""
     if method not in METHODS:
         raise UsageError(f"method: must be one of {', '.join(METHODS)}, got {method!r}")
-    steps = method == "stepped" or bool(inside) or not covers(circuit)
-    return "run_stepped" if steps else "run_exact"
+    if method == "stepped" or inside:
+        return "run_stepped"
+    if exact.covers(circuit):
+        return "run_exact"
+    is_bare = pixel.thresholds.drift_per_s == 0.0 and unfiltered.covers(circuit)
+    return "run_unfiltered" if is_bare else "run_stepped"

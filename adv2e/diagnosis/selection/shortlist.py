@@ -105,9 +105,8 @@ def _halved(reference: Reference, trials: Sequence[Trial]) -> tuple[list[Trial],
         far = trials[0].score - trial.score > CATCHES_UP + _CERTAIN * chance
         return far and not trial.fit.candidate.of_chance
 
-    behind = list(map(is_behind, trials))
-    near = [trial for trial, out in zip(trials, behind, strict=True) if not out]
-    return near, [replace(t, is_behind=True) for t, out in zip(trials, behind, strict=True) if out]
+    told = [replace(trial, is_behind=is_behind(trial)) for trial in trials]
+    return [one for one in told if not one.is_behind], [one for one in told if one.is_behind]
 
 
 def best_forms(trials: Sequence[Trial]) -> list[Trial]:

@@ -99,7 +99,7 @@ def steps_of_time(evidence: Evidence, declared: Config) -> int:
     """Return the number of time steps of a pixel through a recording; 0: it is solved exactly."""
     shown, hooks = evidence.simulated, active_hooks(declared)
     inside, circuit = inside_pixel(hooks), make_circuit(declared.pixel, declared.sampling, 0)
-    if driver_of(declared.pixel, circuit, inside, "auto") != "run_stepped":
+    if driver_of(declared.pixel, circuit, inside, "auto") == "run_exact":
         return 0
     frames = zip(shown.times_ns, shown.lights(declared), strict=True)
     # one at a time: all of them may be many

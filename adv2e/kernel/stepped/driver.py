@@ -29,7 +29,8 @@ from adv2e.kernel.work_queue import claim
 BLOCK = 16
 """Steps after which light and log intensity are computed anew."""
 
-_ROOM = 64
+ROOM = 64
+"""Events that there is room for when a pixel is solved; where it has more, it goes on later."""
 
 
 class Run(NamedTuple):
@@ -135,7 +136,7 @@ def _close(lo, count, draw, circuit, state, strip):
 
 
 @kernel
-def _load_x(schedule, at, lo, count, circuit, memory, row):
+def load_x(schedule, at, lo, count, circuit, memory, row):
     """Log intensity of a strip at instant `at`."""
     light = memory.light[:count]
     load(schedule.frames, schedule.before[at], schedule.share[at], lo, 0.0, light)
@@ -247,7 +248,7 @@ def _fire_gathered(c, count, lo, step, circuit, run, injected, state, memory, bu
     run, injected, state, memory = borrowed(run, injected, state, memory)
     (buffer,) = borrowed(buffer)
     m = step.m
-    while c < count and number + _ROOM <= buffer.keys.shape[0]:
+    while c < count and number + ROOM <= buffer.keys.shape[0]:
         k = memory.pixels[c]
         i = lo + k
         levels = (
@@ -266,7 +267,7 @@ def _fire_step(lo, n, step, circuit, run, injected, state, memory, buffer, numbe
     """Fire the events of a step of a run."""
     c, count = np.int64(0), events.gather(n, memory.strip, memory.pixels)
     while c < count:
-        buffer = with_room(buffer, number, number + _ROOM)
+        buffer = with_room(buffer, number, number + ROOM)
         c, number = _fire_gathered(
             c, count, lo, step, circuit, run, injected, state, memory, buffer, number
         )
@@ -284,14 +285,14 @@ def _strip(lo, count, schedule, circuit, run, injected, state, memory, buffer, n
     draw = np.int64(0)
     if circuit.noise_rms > 0.0:
         draw = np.int64(state[per_pixel.NOISE_DRAW, lo])
-    _load_x(schedule, run.first, lo, count, circuit, memory, rows.XA)
+    load_x(schedule, run.first, lo, count, circuit, memory, rows.XA)
     m = np.int64(0)
     for f in range(run.first, run.last):
         length, steps = starts[f + 1] - starts[f], run.steps[f]
         total = run.pieces * steps
-        _load_x(schedule, f + 1, lo, count, circuit, memory, rows.XB)
+        load_x(schedule, f + 1, lo, count, circuit, memory, rows.XB)
         if last[f + 1]:
-            _load_x(schedule, f + 2, lo, count, circuit, memory, rows.AHEAD)
+            load_x(schedule, f + 2, lo, count, circuit, memory, rows.AHEAD)
         _take_samples(count, schedule.begins and f == 0, last[f], last[f + 1], strip)
         h, half = length / total, 0.5 / steps
         second = signal.second_pole_weights(circuit.follower * h, circuit.update != EXACT)
@@ -347,7 +348,7 @@ def _parts(claimed, most, schedule, circuit, run, injected, state, memory, buffe
     event = 0, 0, step, levels, circuit, injected, state, memory.strip, buffer, 0
     own = [
         (_make_step, (0, 0, 0, step, circuit, run, memory)),
-        (_load_x, (schedule, 0, 0, 0, circuit, memory, 0)),
+        (load_x, (schedule, 0, 0, 0, circuit, memory, 0)),
         (_open, (0, 0, 0, circuit, run, injected, state, memory.strip)),
     ]
     return [(events.fire_step, event)], own
