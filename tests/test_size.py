@@ -31,7 +31,7 @@ LIMITS = {
     "files": 780,
     "formats": 5055,
     "inspection": 260,
-    "kernel": 5035,
+    "kernel": 5220,
     "light": 865,
     "motion": 350,
     "pixel": 575,

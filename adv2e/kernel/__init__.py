@@ -44,7 +44,8 @@ pixels that may fire (7 to 13 %)     40 each in lanes: 9 evaluating the integral
                                      polynomial, the rest gathering, deciding and writing back
 a pixel in pieces                    about 200, two at the knee of the log map between two frames
 a step of all pixels, ``stepped``    5 to 9, of which poles 2 to 3, photoreceptor noise 2 and
-                                     screening 1; 0.5 us more for an event
+                                     screening 1; half of that with one pole and nothing else;
+                                     0.5 us more for an event
 sorting and unpacking                6 an event
 ==================================== ===========================================================
 

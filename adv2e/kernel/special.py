@@ -63,6 +63,21 @@ def log(v):
     return np.float64(e) * _LN2 + 2.0 * f * s
 
 
+# of the polynomial through 12 Chebyshev nodes of 0..1
+_Q0, _Q1, _Q2, _Q3 = 1.0, -0.4999999999999964, 0.1666666666664944, -0.041666666663443576
+_Q4, _Q5, _Q6 = 0.008333333302138762, -0.0013888887104824001, 0.0001984120502317959
+_Q7, _Q8, _Q9 = -2.4800032289946006e-05, 2.753231109497008e-06, -2.7289403227036547e-07
+_Q10, _Q11 = 2.3200975871202737e-08, -1.3221480811326931e-09
+
+
+@kernel
+def settling(a):
+    """(1 - e^-a)/a for 0 <= a <= 1, to rounding; e^-a is 1 less a times it."""
+    s = _Q7 + a * (_Q8 + a * (_Q9 + a * (_Q10 + a * _Q11)))
+    s = _Q3 + a * (_Q4 + a * (_Q5 + a * (_Q6 + a * s)))
+    return _Q0 + a * (_Q1 + a * (_Q2 + a * s))
+
+
 @kernel
 def psi(z):
     """(e^z - 1 - z)/z^2 for |z| <= 1, without cancellation; error below 2e-12."""

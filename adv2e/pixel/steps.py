@@ -181,20 +181,21 @@ class Stepping:
         pieces = circuit.steps if circuit.update != EXACT or circuit.printed else 1
         exact = circuit.update == EXACT
         steps = np.ones(lengths.size, np.int64)
+        brightest = np.zeros(lengths.size)
         if exact:
             brightest, ends_s = _brightest(part, frames, lengths.size), self._seconds(starts)
             for f, length in enumerate(lengths):
                 step_us = longest_step_us(self._hooks, float(ends_s[f]), float(ends_s[f + 1]))
                 steps[f] = steps_of(
-                    length / pieces, circuit, step_us, brightest[f], self._coarseness
+                    length / pieces, circuit, step_us, float(brightest[f]), self._coarseness
                 )
         for first, first_step, stop, stop_step in self._cuts(pieces, steps):
             times = _instants(starts, pieces * steps, first, first_step, stop, stop_step)
             run = Run(
                 first=first, first_step=first_step, last=stop, last_step=stop_step, pieces=pieces,
-                steps=steps, gain=self._course("gain", times), drive=self._course("drive", times),
-                signal=self._course("signal", times), on=self._factors("on", times),
-                off=self._factors("off", times),
+                steps=steps, brightest=brightest, gain=self._course("gain", times),
+                drive=self._course("drive", times), signal=self._course("signal", times),
+                on=self._factors("on", times), off=self._factors("off", times),
             )  # fmt: skip
             yield run, self._injected(times[0], times[-1])
 
@@ -238,16 +239,16 @@ class Stepping:
         return (times + self._origin) * 1e-6
 
 
-def _brightest(part: Part, frames: FrameStack, intervals: int) -> list[float]:
+def _brightest(part: Part, frames: FrameStack, intervals: int) -> NDArray[np.float64]:
     """Return the brightest light of each interval, of all frames that count there [DN]."""
     if frames.coded:
-        return [float(frames.table.max())] * intervals
+        return np.full(intervals, float(frames.table.max()))
     peaks = frames.light.max(axis=1).tolist()
     at = [
         max(peaks[b + 1], peaks[b] if share < 1 else 0.0)
         for b, share in zip(part.before.tolist(), part.share.tolist(), strict=True)
     ]
-    return [max(a, b) for a, b in itertools.pairwise(at[: intervals + 1])]
+    return np.array([max(a, b) for a, b in itertools.pairwise(at[: intervals + 1])], np.float64)
 
 
 def _at_first(values: NDArray[np.float64]) -> NDArray[Any]:

@@ -27,6 +27,14 @@ def test_psi_has_no_cancellation():
         assert abs(special.psi(v) - series) < 2e-11
 
 
+def test_settling():
+    a = np.concatenate([np.linspace(0.001, 1.0, 2001), np.geomspace(1e-12, 1e-3, 100)])
+    found = np.array([special.settling(one) for one in a])
+    np.testing.assert_allclose(found, -np.expm1(-a) / a, rtol=1e-15)
+    np.testing.assert_allclose(1.0 - a * found, np.exp(-a), rtol=1e-15)
+    assert special.settling(0.0) == 1.0
+
+
 def test_exponential_of_one_number():
     t = -np.concatenate([np.linspace(0.0, 2.0, 2001), np.geomspace(2.0, 690.0, 500)])
     found = np.array([special.exp_alone(one) for one in t])

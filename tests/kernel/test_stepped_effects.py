@@ -2,12 +2,21 @@
 
 import numpy as np
 import pytest
-from harness import effect, pure, solve
+from harness import clock, effect, moving_light, pure, quiet, solve
 from reference.agreement import count_and_time_errors
 from reference.differences import LIGHT, PURE, TIMES, Truth, check
 from reference.twin import light_of
 
-from adv2e.config.model import Refractory, ResetOvershoot, SlewLimit, SourceFollower, Thresholds
+from adv2e.config.model import (
+    Leak,
+    LogResponse,
+    Refractory,
+    ResetOvershoot,
+    ShotNoise,
+    SlewLimit,
+    SourceFollower,
+    Thresholds,
+)
 
 DEAD = {"refractory": Refractory(period_us=900.0)}
 
@@ -46,6 +55,42 @@ def test_drive_signal_and_thresholds_that_change(wide):
     assert agreement.count_b > 100
     assert len(agreement.differing) <= 1
     assert agreement.mean_dt_us < 0.6  # courses are lines within a step
+
+
+COURSES = {
+    "signal": {"signal": wave(0.15, 90.0)},
+    "gain": {"gain": lambda t: 1.0 + 0.6 * np.sin(2 * np.pi * 70.0 * t)},
+    "both": {"signal": wave(0.1, 90.0), "gain": lambda t: np.exp(0.3 * np.sin(700.0 * t))},
+    "drive": {"signal": wave(0.1, 90.0), "drive": wave(0.2, 50.0)},
+}
+
+
+@pytest.mark.parametrize("least", [0.3, 12.0])
+@pytest.mark.parametrize("name", COURSES)
+@pytest.mark.quick_cases(1)
+def test_one_pole_alone_is_as_any_circuit(name, least):
+    """Courses of all pixels alike, in one loop, and the same one a pixel, in loops for all effects.
+
+    Light from 0.3 DN on crosses the knee, that from 12 on never does.
+    """
+    pixel = quiet(
+        log_response=LogResponse(linear_below=2.72),
+        leak=Leak(rate_hz=20, photo_rate_hz=10, jitter=0.2),
+        shot_noise=ShotNoise(rate_hz=30),
+        **DEAD,
+    )
+    light, times = np.maximum(moving_light(13, 60, step=0.25), least), clock(13, 1 / 240)
+    ones = np.ones((1, 1, 60))
+    narrow = COURSES[name]
+    wide = {key: lambda t, values=of: values(t)[:, None, None] * ones for key, of in narrow.items()}
+    alone, any_circuit = (
+        solve(light, times, pixel, seed=5, hooks=[effect((1, 60), 50.0, **courses)])
+        for courses in (narrow, wide)
+    )
+    found = count_and_time_errors(alone, any_circuit)
+    assert found.count_b > 300
+    assert not found.differing
+    assert found.max_dt_us < 1e-5
 
 
 def test_all_at_once():

@@ -22,7 +22,7 @@ from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.comparator import with_room
 from adv2e.kernel.inputs import EXACT, load
 from adv2e.kernel.leak import leak_over
-from adv2e.kernel.stepped import events, rows, signal
+from adv2e.kernel.stepped import events, one_pole, rows, signal
 from adv2e.kernel.stepped.signal import keep_first, limit_slew
 from adv2e.kernel.work_queue import claim
 
@@ -46,6 +46,7 @@ class Run(NamedTuple):
     last_step: int
     pieces: int  # of an interval
     steps: NDArray[np.int64]  # of a piece of each interval
+    brightest: NDArray[np.float64]  # light of the frames in each interval [DN]
     gain: NDArray[np.float64]
     drive: NDArray[np.float64]
     signal: NDArray[np.float64]
@@ -63,6 +64,21 @@ class TimeStep(NamedTuple):
     share: float  # of its piece that is over at its end
     half: float  # half of that which it takes
     second: tuple[float, ...]  # weights of the second pole
+
+
+class Pace(NamedTuple):
+    """Steps of an interval."""
+
+    start: float  # of the interval [us]
+    length: float
+    total: int  # number of its steps, and of those of a piece
+    steps: int
+    h: float
+    half: float
+    second: tuple[float, ...]
+    brightest: float  # light of the frames [DN]
+    alone: bool  # whether there is but one pole
+    above: float  # least light of the strip, as a multiple of that at the knee, if there is
 
 
 class SteppedMemory(NamedTuple):
@@ -174,11 +190,9 @@ def _take_piece(n, p, pieces, strip):
 
 
 @kernel
-def _make_step(lo, count, n, step, circuit, run, memory):
-    """Signal of a strip over a step of a run."""
-    m, h, draw, normals, strip = step.m, step.h, step.draw, memory.normals, memory.strip
-    if circuit.causes:
-        signal.keep_parts(n, strip)
+def _take_light(lo, count, n, step, circuit, run, strip):
+    """Light over a step of a run, and what drives the poles."""
+    m = step.m
     if circuit.update == EXACT:
         signal.advance_light(n, step.share, step.half, circuit, strip)
     else:
@@ -188,6 +202,15 @@ def _make_step(lo, count, n, step, circuit, run, memory):
         signal.change_light(lo, count, run.gain, m + 1, circuit, strip)
     if run.drive.shape[0] > 0:
         signal.add_course(n, lo, count, run.drive, m + 1, rows.DRIVEN1, strip)
+
+
+@kernel
+def _make_step(lo, count, n, step, circuit, run, memory):
+    """Signal of a strip over a step of a run."""
+    m, h, draw, normals, strip = step.m, step.h, step.draw, memory.normals, memory.strip
+    if circuit.causes:
+        signal.keep_parts(n, strip)
+    _take_light(lo, count, n, step, circuit, run, strip)
     if circuit.slew > 0.0:
         keep_first(n, strip)
     if not circuit.filtered:
@@ -213,7 +236,7 @@ def _make_step(lo, count, n, step, circuit, run, memory):
     else:
         signal.take_signal(n, rows.INPUT1, strip)
     if run.signal.shape[0] > 0:
-        signal.add_to_signal(n, lo, count, run.signal, m + 1, strip)
+        signal.add_to_signal(n, lo, count, run.signal, m, strip)
 
 
 @kernel
@@ -224,10 +247,10 @@ def _level(course, m, i):
     return course[m, i] if course.shape[1] > 1 else course[m, 0]
 
 
-@kernel
-def _screen_step(lo, count, n, step, circuit, run, strip):
-    """Return the number of pixels that may fire in a step of a run; marks them in row HIT."""
-    m, on, off = step.m, 1.0, 1.0
+@inlined
+def _levels(lo, count, m, run, strip):
+    """Least factors on the rows of thresholds in a step; those of each pixel go to rows."""
+    on, off = 1.0, 1.0
     if run.on.shape[1] > 1:
         events.step_thresholds(count, lo, run.on, m + 1, rows.ON, rows.ON_STEP, strip)
     elif run.on.shape[0] > 0:
@@ -236,7 +259,53 @@ def _screen_step(lo, count, n, step, circuit, run, strip):
         events.step_thresholds(count, lo, run.off, m + 1, rows.OFF, rows.OFF_STEP, strip)
     elif run.off.shape[0] > 0:
         off = min(run.off[m, 0], run.off[m + 1, 0])
-    return events.screen(n, step.start + step.h, leak_over(step.h, circuit), on, off, strip)
+    return on, off
+
+
+@inlined
+def _make_alone(lo, count, n, step, above, circuit, run, strip):
+    """Make a step of one pole and nothing else; returns the number of pixels that may fire."""
+    m, added, factors = step.m, (0.0, 0.0), (1.0, 1.0)
+    if run.signal.shape[0] > 0:
+        added = run.signal[m, 0], run.signal[m + 1, 0]
+    if run.gain.shape[0] > 0:
+        factors = 0.5 * (run.gain[m, 0] + run.gain[m + 1, 0]), run.gain[m + 1, 0]
+    on, off = _levels(lo, count, m, run, strip)
+    if circuit.causes:
+        signal.keep_parts(n, strip)
+        for k in range(n):
+            strip[rows.ADDED + k] = added[1]
+    if run.drive.shape[0] == 0 and min(factors[1], 1.0) * above > 1.0:
+        return one_pole.advance_bright(n, step, factors, added, on, off, circuit, strip)
+    _take_light(lo, count, n, step, circuit, run, strip)
+    return one_pole.advance(n, step, added, on, off, circuit, strip)
+
+
+@kernel
+def _step_of(j, m, draw, pace):
+    """Return step j of an interval."""
+    start, share = pace.start + pace.length * (j / pace.total), (j % pace.steps + 1) / pace.steps
+    return TimeStep(m, draw, start, pace.h, share, pace.half, pace.second)
+
+
+@kernel
+def _make_steps(lo, count, n, j, end, m, draw, pace, circuit, run, memory):
+    """Make the steps j to `end` of an interval, or up to one in which pixels may fire.
+
+    Returns the step after the last that was made, and how many pixels may fire in that.
+    """
+    run, memory = borrowed(run, memory)
+    strip, hits = memory.strip, np.int64(0)
+    while j < end and hits == 0:
+        step = _step_of(j, m, draw, pace)
+        if pace.alone and one_pole.is_gentle(step, pace.brightest, circuit, run):
+            hits = _make_alone(lo, count, n, step, pace.above, circuit, run, strip)
+        else:
+            _make_step(lo, count, n, step, circuit, run, memory)
+            on, off = _levels(lo, count, m, run, strip)
+            hits = events.screen(n, step.start + step.h, leak_over(step.h, circuit), on, off, strip)
+        j, m, draw = j + 1, m + 1, draw + 1
+    return j, hits
 
 
 @kernel
@@ -280,6 +349,7 @@ def _strip(lo, count, schedule, circuit, run, injected, state, memory, buffer, n
     schedule, run, injected, state = borrowed(schedule, run, injected, state)
     (memory,) = borrowed(memory)
     starts, last, strip = schedule.starts, schedule.last, memory.strip
+    alone = one_pole.covers(circuit, run)
     n = -(-count // 16) * 16
     _open(lo, count, n, circuit, run, injected, state, strip)
     draw = np.int64(0)
@@ -297,10 +367,16 @@ def _strip(lo, count, schedule, circuit, run, injected, state, memory, buffer, n
         h, half = length / total, 0.5 / steps
         second = signal.second_pole_weights(circuit.follower * h, circuit.update != EXACT)
         first = run.first_step if f == run.first else 0
+        _take_piece(n, first // steps, run.pieces, strip)
+        above = one_pole.above_knee(count, circuit, strip) if alone else 0.0
+        pace = Pace(
+            starts[f], length, total, steps, h, half, second, run.brightest[f], alone, above
+        )
         stop = run.last_step if f == run.last - 1 else total
-        for j in range(first, stop):
+        j = first
+        while j < stop:
             r = j % steps
-            if r == 0 or j == first:
+            if r == 0 and j > first:
                 _take_piece(n, j // steps, run.pieces, strip)
             if m == 0 or (circuit.update == EXACT and r % BLOCK == 0):
                 signal.begin_block(n, r / steps, half, circuit, strip)
@@ -308,15 +384,14 @@ def _strip(lo, count, schedule, circuit, run, injected, state, memory, buffer, n
                     signal.change_light(lo, count, run.gain, m, circuit, strip)
                 if run.drive.shape[0] > 0:
                     signal.add_course(n, lo, count, run.drive, m, rows.DRIVEN1, strip)
-            start = starts[f] + length * (j / total)
-            step = TimeStep(m, draw, start, h, (r + 1) / steps, half, second)
-            _make_step(lo, count, n, step, circuit, run, memory)
-            if _screen_step(lo, count, n, step, circuit, run, strip) > 0:
+            end = min(stop, j + BLOCK - r % BLOCK, j + steps - r)
+            done, hits = _make_steps(lo, count, n, j, end, m, draw, pace, circuit, run, memory)
+            m, draw, j = m + done - j, draw + done - j, done
+            if hits > 0:
+                step = _step_of(j - 1, m - 1, draw - 1, pace)
                 number, buffer = _fire_step(
                     lo, n, step, circuit, run, injected, state, memory, buffer, number
                 )
-            draw += 1
-            m += 1
         for k in range(n):
             strip[rows.XA + k] = strip[rows.XB + k]
     _close(lo, count, draw, circuit, state, strip)
@@ -344,10 +419,14 @@ def run_stepped(claimed, most, schedule, circuit, run, injected, state, memory, 
 
 def _parts(claimed, most, schedule, circuit, run, injected, state, memory, buffer):
     """Return parts of :func:`run_stepped`, for a second process and this one."""
-    step, levels = TimeStep(0, 0, 0.0, 0.0, 0.0, 0.0, (0.0,) * 5), (0.0,) * 4
+    second, levels = (0.0,) * 5, (0.0,) * 4
+    step, pace = (
+        TimeStep(0, 0, 0.0, 0.0, 0.0, 0.0, second),
+        Pace(0.0, 0.0, 0, 0, 0.0, 0.0, second, 0.0, False, 0.0),
+    )
     event = 0, 0, step, levels, circuit, injected, state, memory.strip, buffer, 0
     own = [
-        (_make_step, (0, 0, 0, step, circuit, run, memory)),
+        (_make_steps, (0, 0, 0, 0, 0, 0, 0, pace, circuit, run, memory)),
         (load_x, (schedule, 0, 0, 0, circuit, memory, 0)),
         (_open, (0, 0, 0, circuit, run, injected, state, memory.strip)),
     ]

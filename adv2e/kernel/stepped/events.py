@@ -124,11 +124,20 @@ def screen(n, end, leak, on, off, strip):
 
 @kernel
 def gather(n, strip, pixels):
-    """Numbers of the pixels that may fire."""
-    m = np.int64(0)
-    for k in range(n):
+    """Numbers of the pixels that may fire, of which there are few."""
+    m, hits = np.int64(0), strip[rows.HIT : rows.HIT + n].view(np.int64)
+    whole = n - n % 16
+    for first in range(0, whole, 16):
+        some, group = np.int64(0), hits[first : first + 16]
+        for k in range(16):
+            some |= group[k]
+        if some != 0:
+            for k in range(16):
+                pixels[m] = first + k
+                m += np.int64(group[k] != 0)
+    for k in range(whole, n):
         pixels[m] = k
-        m += np.int64(strip[rows.HIT + k] != 0.0)
+        m += np.int64(hits[k] != 0)
     return m
 
 

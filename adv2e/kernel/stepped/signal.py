@@ -185,10 +185,12 @@ def add_course(n, lo, count, course, m, row, strip):
 @kernel
 def change_light(lo, count, course, m, circuit, strip):
     """Put the factors of instant m of a course on the light at the end of a step, and on its x."""
+    if course.shape[1] == 1:
+        _change_alike(course[m, 0], count, circuit, strip)
+        return
     knee_dn = math.exp(circuit.knee)
-    wide = course.shape[1] > 1
     for k in range(count):
-        factor = course[m, lo + k] if wide else course[m, 0]
+        factor = course[m, lo + k]
         light = strip[rows.LIGHT1 + k]
         changed = factor * light
         strip[rows.LIGHT1 + k] = changed
@@ -196,6 +198,23 @@ def change_light(lo, count, course, m, circuit, strip):
             strip[rows.DRIVEN1 + k] = changed / circuit.slope
         else:
             strip[rows.DRIVEN1 + k] = special.log(changed)
+
+
+@kernel
+def _change_alike(factor, count, circuit, strip):
+    """Put one factor on the light of all pixels: its logarithm is added, but in the foot."""
+    knee, slope, knee_dn = circuit.knee, circuit.slope, math.exp(circuit.knee)
+    rise, of_foot, doubtful = math.log(factor), 1.0 / (slope if slope > 0.0 else 1.0), 0
+    for k in range(count):
+        x, light = strip[rows.X1 + k], factor * strip[rows.LIGHT1 + k]
+        strip[rows.LIGHT1 + k] = light
+        strip[rows.DRIVEN1 + k] = light * of_foot if light < knee_dn else x + rise
+        doubtful += int((light >= knee_dn) & (x < knee))
+    if doubtful > 0:
+        for k in range(count):
+            light = strip[rows.LIGHT1 + k]
+            if light >= knee_dn and strip[rows.X1 + k] < knee:  # it has left the foot
+                strip[rows.DRIVEN1 + k] = special.log(light)
 
 
 @kernel
@@ -368,15 +387,20 @@ def take_signal(n, row, strip):
 
 @kernel
 def add_to_signal(n, lo, count, course, m, strip):
-    """Add a course, of which instant m ends the step, to the signal."""
-    before = strip[rows.ADDED : rows.ADDED + n]
-    for k in range(n):
-        strip[rows.SLOPE0 + k] -= before[k]
-        strip[rows.SLOPE1 + k] -= before[k]
-        before[k] = 0.0
-    add_course(n, lo, count, course, m, rows.ADDED, strip)
-    for k in range(n):
-        added = strip[rows.ADDED + k]
-        strip[rows.SIGNAL1 + k] += added
-        strip[rows.SLOPE0 + k] += added
-        strip[rows.SLOPE1 + k] += added
+    """Add a course, of which instant m begins the step, to the signal."""
+    if course.shape[1] == 1:
+        before, after = course[m, 0], course[m + 1, 0]
+        for k in range(n):
+            _add(k, before, after, strip)
+    else:
+        all_before, all_after = course[m, lo : lo + count], course[m + 1, lo : lo + count]
+        for k in range(count):
+            _add(k, all_before[k], all_after[k], strip)
+
+
+@kernel
+def _add(k, before, after, strip):
+    strip[rows.SIGNAL1 + k] += after
+    strip[rows.SLOPE0 + k] = strip[rows.SLOPE0 + k] - before + after
+    strip[rows.SLOPE1 + k] = strip[rows.SLOPE1 + k] - before + after
+    strip[rows.ADDED + k] = after
