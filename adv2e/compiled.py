@@ -214,6 +214,15 @@ def inlined(function: Function) -> Function:
     return function if _PLAIN else Compiled(function, inline="always")  # type: ignore[return-value]
 
 
+def embedded(function: Function) -> Function:
+    """Compile `function`, and have LLVM put its code into that of each caller.
+
+    For short functions that are called for single pixels: records in their arguments are passed
+    number by number, which takes longer than what they do.
+    """
+    return function if _PLAIN else Compiled(function, forceinline=True)  # type: ignore[return-value]
+
+
 @kernel
 def _nothing() -> None:
     """Do nothing: the first function that is loaded has Numba load what it needs for all."""

@@ -18,7 +18,7 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1440,
+    "": 1445,
     "batches": 1340,
     "cli": 1290,
     "comparison": 710,
@@ -31,7 +31,7 @@ LIMITS = {
     "files": 780,
     "formats": 5055,
     "inspection": 260,
-    "kernel": 5220,
+    "kernel": 5640,
     "light": 865,
     "motion": 350,
     "pixel": 575,
@@ -44,7 +44,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 308
+FILES = 309
 """Most modules of all packages together."""
 
 _SLACK = 60

@@ -42,6 +42,8 @@ first pass, moving strip             2.5 (5.8), of which 7 nodes of the quadratu
 first pass, strip at rest            0.2 (0.5): comparing the grey values
 pixels that may fire (7 to 13 %)     40 each in lanes: 9 evaluating the integral, 7 the Taylor
                                      polynomial, the rest gathering, deciding and writing back
+the same behind two poles            (600 each in its lanes: of a hundred, 47 finding the next
+                                     substep one by one, 19 its signal, 13 its bounds, 8 the root)
 a pixel in pieces                    about 200, two at the knee of the log map between two frames
 a step of all pixels, ``stepped``    5 to 9, of which poles 2 to 3, photoreceptor noise 2 and
                                      screening 1; half of that with one pole and nothing else;

@@ -43,7 +43,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import kernel
+from adv2e.compiled import embedded, kernel
 from adv2e.kernel import per_pixel, special
 from adv2e.kernel.noise import next_noise
 from adv2e.kernel.quadrature import REACH
@@ -124,7 +124,7 @@ def log_of(light, circuit):
     return x
 
 
-@kernel
+@embedded
 def watch(k, i, x1, start, circuit, state, strip):
     """Rows of the screen for pixel k of a strip, i of the state: distance, thresholds, due time."""
     strip[AWAY_1 + k] = x1 - state[per_pixel.REFERENCE, i]

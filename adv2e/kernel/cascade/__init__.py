@@ -1,9 +1,9 @@
 r"""The two poles, one behind the other, without small steps of time.
 
 ``plan`` cuts intervals into substeps, ``screen`` advances all pixels of a strip through them and
-tells which may fire, ``substep`` is the signal of one pixel within a substep, and ``pixel`` finds
-the events of one that may, beside its photoreceptor noise, too; there, ``second_look`` tells more
-closely which may.
+tells which may fire, and ``lanes`` finds the events of those that may, beside their photoreceptor
+noise, too; there, ``second_look`` tells more closely which may.  ``substep`` is the signal of one
+pixel within a substep, and finds its events there where ``lanes`` cannot tell.
 
 Within a substep the light, and with it the corner w of the first pole, is known.  With u = y - x
 the lag of the first pole, t = 0..1 over the substep, a the integral of w and c its change,

@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 from adv2e.compiled import inlined, kernel
 from adv2e.kernel import screen, special
 from adv2e.kernel.borrowing import borrowed
-from adv2e.kernel.cascade import pixel as alone
+from adv2e.kernel.cascade import lanes, second_look
 from adv2e.kernel.cascade import screen as cascade
-from adv2e.kernel.cascade import second_look
 from adv2e.kernel.cascade.substep import Piece
-from adv2e.kernel.comparator import with_room
 from adv2e.kernel.leak import leak_strip, leaks, lower_references
 from adv2e.kernel.photoreceptor import path as noise_path
 from adv2e.kernel.photoreceptor import strip as photoreceptor
@@ -36,6 +34,9 @@ class CascadeMemory(NamedTuple):
     path: noise_path.NoisePath  # noise of a few pixels,
     places: NDArray[np.int64]  # which are at these places of the sorted strip
     look: second_look.Look
+    lanes: NDArray[np.float64]
+    cells: NDArray[np.float32]
+    roots: NDArray[np.float64]
 
 
 def new_memory() -> CascadeMemory:
@@ -43,7 +44,7 @@ def new_memory() -> CascadeMemory:
     return CascadeMemory(
         np.zeros(STRIP), np.zeros(STRIP), np.ones(STRIP, np.float32), np.arange(2.0),
         photoreceptor.new_memory(), noise_path.new_path(), np.zeros(LANES, np.int64),
-        second_look.new_look(),
+        second_look.new_look(), lanes.new_lanes(), lanes.new_cells(), lanes.new_roots(),
     )  # fmt: skip
 
 
@@ -67,22 +68,11 @@ def _end_piece(share, strip, circuit, own):
         strip[screen.LIGHT_1 + k] = _f(light) if share < 1.0 else own.light[k]
 
 
-@kernel
-def _solve_alone(lo, m, piece, circuit, state, memory, buffer, n):
-    """Solve m pixels over a piece one by one."""
-    j, s = np.int64(0), 0.0
-    while j < m:
-        n, j, s = alone.solve_flagged(lo, j, m, s, piece, circuit, state, memory, buffer, n)
-        if j < m:
-            buffer = with_room(buffer, n, n + 1)
-    return n, buffer
-
-
 @inlined
 def _solve_beside_noise(lo, number, which, piece, circuit, laws, state, memory, buffer, n):
     """Solve the flagged pixels of a strip over piece `number` of all, which has law `which`."""
     strip, pixels, own = memory.strip.rows, memory.strip.pixels, memory.cascade
-    noise, path = own.noise, own.path
+    noise, path, held = own.noise, own.path, np.int64(0)
     for g in range(laws.samples.shape[1]):
         samples, depth, p = laws.samples[which, g], laws.levels[which, g], noise.ends[g]
         while p < noise.ends[g + 1]:
@@ -98,7 +88,12 @@ def _solve_beside_noise(lo, number, which, piece, circuit, laws, state, memory, 
                 size, own.places, number, samples, depth, circuit, laws.fine[which], noise, path
             )
             second_look.find_places(size, piece, circuit, memory.strip, path, own.look)
-            n, buffer = _solve_alone(lo, size, piece, circuit, state, memory, buffer, n)
+            held = lanes.load(lo, held, 0, size, circuit, state, memory)
+            if held > lanes.MOST - LANES:
+                n, buffer = lanes.solve(lo, held, piece, circuit, state, memory, buffer, n)
+                held = np.int64(0)
+    if held > 0:
+        n, buffer = lanes.solve(lo, held, piece, circuit, state, memory, buffer, n)
     return n, buffer
 
 
@@ -150,7 +145,9 @@ def advance(lo, count, interval, number, still, circuit, plan, state, memory, bu
             )
         else:
             m = screen.flagged(strip, memory.strip.pixels)
-            n, buffer = _solve_alone(lo, m, piece, circuit, state, memory, buffer, n)
+            for j in range(0, m, lanes.MOST):
+                size = lanes.load(lo, 0, j, min(lanes.MOST, m - j), circuit, state, memory)
+                n, buffer = lanes.solve(lo, size, piece, circuit, state, memory, buffer, n)
         if has_leak:
             lower_references(lo, 0, count, state, memory.strip)
         cascade.step_on(strip, substeps, still)
@@ -167,4 +164,7 @@ def parts(circuit, plan, state, memory, buffer):
         (noise_path.sample, (0, own.places, 0, 0, 0, circuit, laws.fine[0], noise, path)),
         (second_look.find_places, (0, piece, circuit, strip, path, own.look)),
     ]
-    return theirs, [(_solve_alone, (0, 0, piece, circuit, state, memory, buffer, 0))]
+    return theirs, [
+        (lanes.solve, (0, 0, piece, circuit, state, memory, buffer, 0)),
+        (lanes.load, (0, 0, 0, 0, circuit, state, memory)),
+    ]

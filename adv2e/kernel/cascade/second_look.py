@@ -168,7 +168,7 @@ def _look_at_stretches(count, samples, levels, third, seen, circuit, path, look)
 def find_places(size, piece, circuit, memory, path, look):
     """Fill `look.found` with the earliest place in a piece at which each pixel may fire.
 
-    A place beyond 1: the pixel cannot fire.
+    A place beyond 1: the pixel cannot fire.  From that place on, all noise is drawn.
 
     Parameters
     ----------
@@ -215,3 +215,4 @@ def find_places(size, piece, circuit, memory, path, look):
         _look_at_stretches(waiting, samples, levels, third, seen, circuit, path, look)
     for c in range(size):
         look.found[c] = rows[_PLACE + c]
+    noise.draw_rest(size, look.found, circuit, path)

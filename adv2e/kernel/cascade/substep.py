@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import kernel
+from adv2e.compiled import embedded, kernel
 from adv2e.kernel import per_pixel, special
 from adv2e.kernel.comparator import TIE, cause_by_most, fire, note_parts
 from adv2e.kernel.noise import NONE, noise_within, take_noise
@@ -29,7 +29,7 @@ _SLOW = 0.01
 """Corner in a substep below which the exact answer is a difference of large numbers."""
 
 _NEWTON = 30
-_SETTLED = 1e-4
+SETTLED = 1e-4
 """Step of Newton's method after which the next one is below 1e-8: half its square at most, as the
 slope where it is used changes by less than itself."""
 
@@ -47,7 +47,7 @@ class SignalCurve(NamedTuple):
     b: float
 
 
-@kernel
+@embedded
 def lag_curve(u0, slope0, bend0, u1, slope1, bend1, q0, d, b):
     """Lag of the second pole: `q0` at the start, for the lag of the first one as its input.
 
@@ -59,23 +59,27 @@ def lag_curve(u0, slope0, bend0, u1, slope1, bend1, q0, d, b):
     p3 = 10.0 * rise - 4.0 * turn + 0.5 * bend
     p4 = -15.0 * rise + 7.0 * turn - bend
     p5 = 6.0 * rise - 3.0 * turn + 0.5 * bend
-    if b == 0.0:
-        return SignalCurve(p0, p1, p2, p3, p4, p5, 0.0, 0.0)
-    if b < _SLOW:
-        # the series, whose seventh term is taken for one like the sixth
-        s1 = b * (p0 - q0) - d
-        s2 = b * (p1 - s1) / 2.0
-        s3 = b * (p2 - s2) / 3.0
-        s4 = b * (p3 - s3) / 4.0
-        s5 = b * (p4 - s4) / 5.0
-        return SignalCurve(q0, s1, s2, s3, s4, s5 + b * (p5 - s5) / 6.0, 0.0, 0.0)
-    lag = 1.0 / b
+    # the series, whose seventh term is taken for one like the sixth
+    s1 = b * (p0 - q0) - d
+    s2 = b * (p1 - s1) / 2.0
+    s3 = b * (p2 - s2) / 3.0
+    s4 = b * (p3 - s3) / 4.0
+    s5 = b * (p4 - s4) / 5.0
+    s5 += b * (p5 - s5) / 6.0
+    is_slow, has_none = b < _SLOW, b == 0.0
+    lag = 0.0 if has_none else 1.0 / (1.0 if is_slow else b)
     p4 -= 5.0 * p5 * lag
     p3 -= 4.0 * p4 * lag
     p2 -= 3.0 * p3 * lag
     p1 -= 2.0 * p2 * lag
     p0 -= (p1 + d) * lag
-    return SignalCurve(p0, p1, p2, p3, p4, p5, q0 - p0, b)
+    # chosen, not branched: for loops over lanes
+    series = is_slow & (not has_none)
+    return SignalCurve(
+        q0 if series else p0, s1 if series else p1, s2 if series else p2, s3 if series else p3,
+        s4 if series else p4, s5 if series else p5, 0.0 if is_slow else q0 - p0,
+        0.0 if is_slow else b,
+    )  # fmt: skip
 
 
 @kernel
@@ -124,10 +128,10 @@ def bent(curve, swing):
     return most + curve.b * curve.b * abs(swing)
 
 
-@kernel
-def _guess(v0, slope0, v1, slope1, width):
+@embedded
+def guess_root(v0, slope0, v1, slope1, width):
     """Return the approximate root of the cubic through values and slopes, from its start."""
-    t = v0 / (v0 - v1)
+    t = v0 / (v0 - v1 if v0 != v1 else 1.0)
     s0, s1 = slope0 * width, slope1 * width
     c2, c3 = 3.0 * (v1 - v0) - 2.0 * s0 - s1, s0 + s1 - 2.0 * (v1 - v0)
     for _ in range(2):
@@ -139,7 +143,7 @@ def _guess(v0, slope0, v1, slope1, width):
 @kernel
 def _root(curve, low, v_low, slope_low, high, v_high, slope_high):
     """Root of a curve that rises through zero once in [low, high]: Newton, else halving."""
-    t = low + _guess(v_low, slope_low, v_high, slope_high, high - low)
+    t = low + guess_root(v_low, slope_low, v_high, slope_high, high - low)
     if not low <= t <= high:
         t = 0.5 * (low + high)
     for _ in range(_NEWTON):
@@ -151,7 +155,7 @@ def _root(curve, low, v_low, slope_low, high, v_high, slope_high):
         after = t - v / slope if slope > 0.0 else -1.0
         if not low <= after <= high:
             after = 0.5 * (low + high)
-        if abs(after - t) < _SETTLED:
+        if abs(after - t) < SETTLED:
             return after
         t = after
     return t
@@ -202,9 +206,6 @@ class Cubic(NamedTuple):
     c3: float
 
 
-NO_NOISE = Cubic(0.0, 0.0, 0.0, 0.0)
-
-
 class Piece(NamedTuple):
     """Part of an interval, the lags at the ends of whose substeps are kept."""
 
@@ -242,7 +243,7 @@ def light_of(x, on_log, circuit):
     return special.exp(x) if on_log else circuit.slope * x
 
 
-@kernel
+@embedded
 def hull(u0, u1, q0, q1, d):
     """Bounds of the signal in a substep, less x at its start; see the bounds of the screens.
 
@@ -257,7 +258,7 @@ def hull(u0, u1, q0, q1, d):
     return high, low
 
 
-@kernel
+@embedded
 def may_fire(high, low, fallen0, fallen1, on, off):
     """Tell whether a distance from the reference may reach a level, given its bounds.
 

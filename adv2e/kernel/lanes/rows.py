@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import kernel
+from adv2e.compiled import embedded, kernel
 from adv2e.kernel.work_queue import STRIP
 
 TOLERANCE = 0.002
@@ -93,7 +93,7 @@ def new_rows() -> NDArray[np.float64]:
     return rows
 
 
-@kernel
+@embedded
 def move(lanes, source, target):
     """Move the state of lane `source` that is kept from round to round to lane `target`."""
     for row in range(X0, PLACE + 1, _STRIDE):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.compiled import inlined, kernel
+from adv2e.compiled import embedded, inlined, kernel
 from adv2e.kernel import rng
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.photoreceptor import law, strip
@@ -315,21 +315,18 @@ def origin(t, path):
 
 
 @kernel
-def cubic_of(r, c, start, width, corner, seen, rows):
-    """Coefficients of the noise in cell r of lane c, as a cubic of the place in a substep.
+def cubic_of(n0, s0, n1, s1, start, width, corner, is_line):
+    """Coefficients of the noise in a cell, as a cubic of the place in a substep.
 
-    The cell begins at place `start` of the substep, and is `width` of it.
-    corner : of the second pole, in the cell [rad]; 0: there is none, and the noise is a line
-    seen : first row of the noise at the comparator
+    n0, s0, n1, s1 : noise behind the first pole and at the comparator, at both ends
+    start, width : of the cell, as shares of the substep
+    corner : of the second pole, in the cell [rad]
+    is_line : whether there is none, and the noise is a line
     """
-    at, after = r * LANES + c, (r + 1) * LANES + c
-    s0, s1 = float(rows[seen + at]), float(rows[seen + after])
-    v0 = corner * (float(rows[NOISE + at]) - s0)
-    v1 = corner * (float(rows[NOISE + after]) - s1)
-    rise = s1 - s0
-    a1, a2, a3 = v0, 3.0 * rise - 2.0 * v0 - v1, v0 + v1 - 2.0 * rise
-    if corner == 0.0:
-        a1, a2, a3 = rise, 0.0, 0.0
+    v0, v1, rise = corner * (n0 - s0), corner * (n1 - s1), s1 - s0
+    a1 = rise if is_line else v0
+    a2 = 0.0 if is_line else 3.0 * rise - 2.0 * v0 - v1
+    a3 = 0.0 if is_line else v0 + v1 - 2.0 * rise
     scale = 1.0 / width
     a1, a2, a3 = a1 * scale, a2 * scale * scale, a3 * scale * scale * scale
     return (
@@ -341,6 +338,33 @@ def cubic_of(r, c, start, width, corner, seen, rows):
 
 
 @kernel
+def draw_rest(size, places, circuit, path):
+    """Draw all noise of the pixels whose place is 1 or less, from that place of the piece on."""
+    (path,) = borrowed(path)
+    samples, levels = grid(path)
+    waiting = np.int64(0)
+    for j in range(samples):
+        for c in range(size):
+            if places[c] * samples < j + 1 and not is_known(j, c, path.rows):
+                wait(waiting, c, j, path)
+                waiting += 1
+                if waiting == LANES:
+                    draw_stretches(waiting, levels, circuit, path)
+                    waiting = np.int64(0)
+    if waiting > 0:
+        draw_stretches(waiting, levels, circuit, path)
+
+
+@embedded
+def copy_cells(c, seen, path, cells):
+    """Copy the noise of lane c at the ends of all cells, behind both poles; returns how many."""
+    rows, count = path.rows, path.numbers[_SAMPLES] << path.numbers[_LEVELS]
+    for r in range(count + 1):
+        cells[2 * r], cells[2 * r + 1] = rows[r * LANES + c], rows[seen + r * LANES + c]
+    return count
+
+
+@embedded
 def bounds_in_cell(n0, s0, n1, s1, third):
     """Bounds of the noise in a cell: those of the Bezier points of its cubic.
 
@@ -349,12 +373,3 @@ def bounds_in_cell(n0, s0, n1, s1, third):
     """
     a, b = s0 + third * (n0 - s0), s1 - third * (n1 - s1)
     return max(s0, s1, a, b), min(s0, s1, a, b)
-
-
-@kernel
-def bounds_of_cell(r, c, third, seen, rows):
-    """Bounds of the noise at the comparator in cell r of lane c."""
-    at, after = r * LANES + c, (r + 1) * LANES + c
-    return bounds_in_cell(
-        rows[NOISE + at], rows[seen + at], rows[NOISE + after], rows[seen + after], third
-    )
