@@ -13,6 +13,7 @@ from reference.dense_ode import as_lists, dense_truth
 from adv2e.config.model import (
     Leak,
     LowPass,
+    PhotoreceptorNoise,
     Pixel,
     Refractory,
     ResetOvershoot,
@@ -153,6 +154,45 @@ def test_same_events_as_in_steps_of_time(name, causes):
             events_of_steps["cause"], minlength=16
         )
         assert alike or np.abs(differ).sum() < 0.002 * len(events)
+
+
+IN_LANES = {
+    "noise": {
+        "low_pass": LowPass(cutoff_hz=2200.0, dark_cutoff_hz=20.0),
+        "source_follower": SourceFollower(cutoff_hz=100.0),
+        "photoreceptor_noise": PhotoreceptorNoise(rms=0.05),
+    },
+    "noise behind one pole": {"photoreceptor_noise": PhotoreceptorNoise(rms=0.05)},
+    "drift and leak": {
+        "source_follower": SourceFollower(cutoff_hz=1000.0),
+        "thresholds": Thresholds(on=0.1, off=0.12, mismatch=0.03, drift_per_s=20.0),
+        "leak": Leak(rate_hz=20.0, photo_rate_hz=30.0, jitter=0.1),
+    },
+    "dead time": {
+        "source_follower": SourceFollower(cutoff_hz=300.0),
+        "refractory": Refractory(period_us=400.0),
+        "photoreceptor_noise": PhotoreceptorNoise(rms=0.05),
+    },
+}
+
+
+@pytest.mark.parametrize("name", IN_LANES)
+def test_side_by_side_as_one_by_one(name):
+    """With causes a pixel is solved by itself, with other bounds and another search for roots."""
+    draw = np.random.default_rng(9)
+    light = np.clip(90 + 60 * draw.normal(size=(6, 20, 60)), 1, 255).astype(np.float32)
+    times = [k * 4_000_000 for k in range(len(light))]
+    found = []
+    for causes in (False, True):
+        array = start(
+            light, times, quiet(**IN_LANES[name]), seed=5, exact_times=True, causes=causes
+        )
+        events, exact = advance(array, light, times)
+        found.append(by_pixel(array, events, exact))
+    assert sum(len(one) for one in found[0]) > 5000
+    for ours, theirs in zip(*found, strict=True):
+        assert np.array_equal(ours[:, 1], theirs[:, 1])
+        assert np.all(np.abs(ours[:, 0] - theirs[:, 0]) < 1e-9)  # s
 
 
 def test_events_do_not_run_out_of_room():
