@@ -33,6 +33,7 @@ from adv2e.kernel.cascade.substep import (
     plus,
 )
 from adv2e.kernel.comparator import TIE, fire, with_room
+from adv2e.kernel.lanes.rows import WIDTH, whole
 from adv2e.kernel.leak import fall_over, leak_rate
 from adv2e.kernel.noise import NONE, next_noise
 from adv2e.kernel.photoreceptor import path as noise
@@ -45,8 +46,7 @@ MOST = 256
 _A_LANE = 2 * (MOST_CELLS + 1)
 """Numbers of noise of a lane."""
 
-_WIDTH = 16  # lanes are computed this many at a time, so that every loop is whole vectors
-_STRIDE = MOST + _WIDTH + 8  # rows must not share cache sets
+_STRIDE = MOST + WIDTH + 8  # rows must not share cache sets
 (
     # what holds over the piece
     _PIXEL,  # number in the strip
@@ -174,12 +174,6 @@ def new_cells() -> NDArray[np.float32]:
 def new_roots() -> NDArray[np.float64]:
     """Return the flat array of rows of roots."""
     return np.ones((4 + len(_COPIED)) * _STRIDE)
-
-
-@embedded
-def _whole(count):
-    """Round a number of lanes up to whole vectors."""
-    return (count + _WIDTH - 1) // _WIDTH * _WIDTH
 
 
 # ---- Pixels into lanes and out of them.
@@ -659,7 +653,7 @@ def _search(m, lanes, roots):
             for row in range(len(_COPIED)):
                 roots[_FIRST_COPY + row * _STRIDE + count] = lanes[_COPIED[row] + j]
             count += 1
-    _find_roots(_whole(count), roots, roots[_FIRST_COPY:])
+    _find_roots(whole(count), roots, roots[_FIRST_COPY:])
     for k in range(count):
         j = int(roots[_TAKEN + k])
         t = lanes[_T + j]
@@ -799,13 +793,13 @@ def solve(lo, m, piece, circuit, state, memory, buffer, n):
     Returns the number of events, and their buffer.
     """
     lanes = memory.cascade.lanes
-    _open(_whole(m), piece, circuit, lanes)
+    _open(whole(m), piece, circuit, lanes)
     while True:
         m = _go_on_all(lo, m, piece, circuit, state, memory)
         if m == 0:
             return n, buffer
         buffer = with_room(buffer, n, n + m)
-        count = _whole(m)
+        count = whole(m)
         _find_signals(count, piece, circuit, lanes)
         _cross(count, piece, circuit, lanes)
         _search(m, lanes, memory.cascade.roots)
