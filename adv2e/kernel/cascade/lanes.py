@@ -350,7 +350,7 @@ def _next_cell(j, piece, circuit, cells, lanes):
     r, begun = np.int64((s0 + t * span) * count), np.int64(lanes[_CELL + j]) + 1
     if begun > 0:
         r = max(r if held else 0, begun)
-    third, at = np.float32(circuit.follower * piece.length / count * _THIRD), np.int64(0)
+    third = np.float32(circuit.follower * piece.length / count * _THIRD)
     at = np.int64(lanes[_NOISE + j]) + 2 * r
     n1, ns1 = cells[at], cells[at + 1]
     while r < last:

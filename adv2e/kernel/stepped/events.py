@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.causes import OWN_EFFECT
-from adv2e.compiled import inlined, kernel
+from adv2e.compiled import embedded, inlined, kernel
 from adv2e.kernel import per_pixel
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.comparator import TIE, cause_by_most, fire, note_parts
@@ -97,6 +97,20 @@ def _fall(k, on, leak, strip):
     return fall, on * (constant + per_dn * i0), on * (constant + per_dn * i1)
 
 
+@embedded
+def may_fire(k, d1, d2, d3, on, off, end, strip):
+    """Tell whether pixel k may fire before `end`, given Bezier points of its distance.
+
+    on, off: factors on the rows of thresholds.
+    """
+    high = d1 if d1 > d2 else d2
+    high = high if high > d3 else d3
+    low = d1 if d1 < d2 else d2
+    low = low if low < d3 else d3
+    hit = (high >= strip[rows.ON_STEP + k] * on) | (-low >= strip[rows.OFF_STEP + k] * off)
+    return hit | (strip[rows.DUE + k] < end)
+
+
 @kernel
 def screen(n, end, leak, on, off, strip):
     """Row HIT: pixels that may fire before `end` [us]; REFERENCE: at the end of the step.
@@ -110,12 +124,7 @@ def screen(n, end, leak, on, off, strip):
         d0, d3 = strip[rows.SIGNAL0 + k] - reference, strip[rows.SIGNAL1 + k] - reference + fall
         d1 = d0 + (strip[rows.SLOPE0 + k] + slope0) * _THIRD
         d2 = d3 - (strip[rows.SLOPE1 + k] + slope1) * _THIRD
-        high = d1 if d1 > d2 else d2
-        high = high if high > d3 else d3
-        low = d1 if d1 < d2 else d2
-        low = low if low < d3 else d3
-        hit = (high >= strip[rows.ON_STEP + k] * on) | (-low >= strip[rows.OFF_STEP + k] * off)
-        hit |= strip[rows.DUE + k] < end
+        hit = may_fire(k, d1, d2, d3, on, off, end, strip)
         strip[rows.REFERENCE + k] = reference - fall
         strip[rows.HIT + k] = 1.0 if hit else 0.0
         hits += np.int64(hit)

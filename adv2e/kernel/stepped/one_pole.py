@@ -15,6 +15,7 @@ from adv2e.kernel import special
 from adv2e.kernel.inputs import EXACT
 from adv2e.kernel.leak import leak_over
 from adv2e.kernel.stepped import rows
+from adv2e.kernel.stepped.events import may_fire
 
 _THIRD = 1.0 / 3.0
 _MOST = 0.999
@@ -80,12 +81,7 @@ def _advance_pixel(k, lights, x0, x1, constants, strip):
     d0, d3 = v0 - reference, v1 - lowered
     d1 = d0 + (slope0 + level * (leak + leak_per_dn * i0)) * _THIRD
     d2 = d3 - (slope1 + level * (leak + leak_per_dn * i1)) * _THIRD
-    high = d1 if d1 > d2 else d2
-    high = high if high > d3 else d3
-    low = d1 if d1 < d2 else d2
-    low = low if low < d3 else d3
-    hit = (high >= strip[rows.ON_STEP + k] * on) | (-low >= strip[rows.OFF_STEP + k] * off)
-    hit |= strip[rows.DUE + k] < end
+    hit = may_fire(k, d1, d2, d3, on, off, end, strip)
     strip[rows.REFERENCE + k] = lowered
     strip[rows.HIT + k] = 1.0 if hit else 0.0
     return hit
