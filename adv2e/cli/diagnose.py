@@ -48,7 +48,8 @@ def command(
     what to record.
 
     DIR (-o; default: <stem>.diagnosis) gets report.html with the pictures, report.json, and
-    model.yaml, the declared model with what was found, for 'adv2e convert -c'.
+    model.yaml, the declared model with what was found, for 'adv2e convert -c'. Until the end, they
+    hold what is known so far, and say so; Ctrl-C leaves them.
 
     \b
     Examples:

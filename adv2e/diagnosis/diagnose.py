@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Sequence
 from contextlib import closing
+from dataclasses import replace
+from typing import Any
 
 from adv2e import __version__
 from adv2e.background import default_threads
@@ -18,6 +20,9 @@ from adv2e.diagnosis.configurations import (
     own_of,
 )
 from adv2e.diagnosis.data.evidence import Evidence
+from adv2e.diagnosis.data.scene import Placed, Scene
+from adv2e.diagnosis.data.splits import Stream
+from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.fitting.fitter import thresholds_of
 from adv2e.diagnosis.outcome.findings import (
     about_drifts,
@@ -26,12 +31,15 @@ from adv2e.diagnosis.outcome.findings import (
     rejected_of,
     signatures_of,
 )
-from adv2e.diagnosis.outcome.verdict import conclude, detectable, remark_of
+from adv2e.diagnosis.outcome.picture import pictures_of
+from adv2e.diagnosis.outcome.verdict import conclude, detectable, drawn, remark_of
 from adv2e.diagnosis.prepare import DECLARED, prepare
+from adv2e.diagnosis.selection.reference import State
 from adv2e.diagnosis.selection.search import Search
 from adv2e.diagnosis.simulation.affordable import affordable
 from adv2e.diagnosis.simulation.simulator import Simulator
-from adv2e.reports.result import Diagnosis
+from adv2e.diagnosis.statistics.summary import BOTH
+from adv2e.reports.result import Diagnosis, Rejected
 
 
 def diagnose(
@@ -46,6 +54,7 @@ def diagnose(
     threads: int | None = None,
     progress: Callable[[str, int], None] = lambda stage, simulations: None,
     log: Callable[[str], None] = lambda text: None,
+    known: Callable[[Diagnosis], None] | None = None,
 ) -> Diagnosis:
     """Find the effects that the declared model of a recording lacks.
 
@@ -74,6 +83,9 @@ def diagnose(
         simulation.
     log : callable
         Takes lines for people.
+    known : callable, optional
+        Takes what is known so far after each stage, as a diagnosis that is not finished.  The
+        result does not depend on it.
 
     Raises
     ------
@@ -81,47 +93,14 @@ def diagnose(
         Too few events are left of a recording that would take too long.
     """
     began = time.perf_counter()
-    given, known = declared, evidence.stimulus is not None
-    if known:
+    given = declared
+    if evidence.stimulus is not None:
         declared = of_known_light(declared)
     evidence = affordable(evidence, declared)
     with closing(Simulator(evidence, threads or default_threads(), progress)) as simulator:
-        simulator.begin(DECLARED)
-        prepared = prepare(evidence, declared, simulator, without, free_thresholds, log)
-        evidence, reference = prepared.evidence, prepared.reference
-        declared = reference.declared
-        search = Search(reference, prepared.candidates)
-        outcome = search.run()
-        found = conclude(prepared, search, outcome)
-        kept = found.kept
-        effects = [
-            finding_of(fit, evidence.width * evidence.height, kept.config) for fit in kept.fits
-        ]
-        nuisances = thresholds_of(kept.config) if free_thresholds else {}
-        held = declared_of(given, [*nuisances, *(key for one in effects for key in one.parameters)])
-        return Diagnosis(
-            verdict=found.verdict,
-            remark=remark_of(found.verdict, outcome),
-            recording=evidence.name,
-            declared=declared_name,
-            effects=effects,
-            alternatives=outcome.alternatives if kept.fits else [],
-            nuisances=nuisances,
-            rejected=rejected_of(reference, outcome, kept, search.candidates),
-            errors=found.errors,
-            global_p_before=search.overall(search.declared),
-            global_p_after=search.overall(kept),
-            signatures=signatures_of(reference, search.declared, kept),
-            curves=found.curves,
-            maps=found.maps,
-            totals=found.totals,
-            snapshot=found.snapshot,
-            detectable=detectable(reference, search.declared, search.candidates) if sizes else [],
-            masked=evidence.masked,
-            split=prepared.scene.split.text(),
-            notes=[*evidence.notes, *about_frames(prepared), *about_drifts(evidence, kept.config)],
-            model=as_found(of_frames_again(kept.config, given) if known else kept.config),
-            facts={
+
+        def facts() -> dict[str, str]:
+            return {
                 "sensor": f"{evidence.width}x{evidence.height}",
                 "length": f"{evidence.seconds:.3f} s",
                 "events": f"{len(evidence.stream):,}",
@@ -130,12 +109,63 @@ def diagnose(
                 "seed": str(declared.seed),
                 "time taken": f"{time.perf_counter() - began:.0f} s",
                 "adv2e": __version__,
-            },
+            }
+
+        def model(config: Config, fits: Sequence[Fitted] = ()) -> dict[str, Any]:
+            """Return what a diagnosis says of a model."""
+            effects = [finding_of(fit, evidence.width * evidence.height, config) for fit in fits]
+            nuisances = thresholds_of(config) if free_thresholds else {}
+            keys = (key for one in effects for key in one.parameters)
+            held = declared_of(given, [*nuisances, *keys])
+            is_known = evidence.stimulus is not None
+            return {
+                "effects": effects,
+                "nuisances": nuisances,
+                "declared_values": held,
+                "defaults": defaults_of(held, written),
+                "model": as_found(of_frames_again(config, given) if is_known else config),
+            }
+
+        begun = Diagnosis(
+            verdict="unfinished",
+            remark=_SO_FAR,
+            recording=evidence.name,
+            declared=declared_name,
+            masked=evidence.masked,
             own=own_of(declared),
-            input_checks=evidence.notes,
-            declared_values=held,
-            defaults=defaults_of(held, written),
+            still=DECLARED,
+            **model(declared),
         )
+        so_far = _SoFar(begun, simulator, model, facts, known)
+        simulator.begin(DECLARED)
+        given_to = evidence, declared, simulator, without, free_thresholds, log
+        prepared = prepare(*given_to, so_far.prepared)
+        evidence, reference = prepared.evidence, prepared.reference
+        reference.begin = so_far.begin
+        search = Search(reference, prepared.candidates, so_far.changed)
+        outcome = search.run()
+        found = conclude(prepared, search, outcome)
+        kept = found.kept
+        whole = replace(
+            begun,
+            **model(kept.config, kept.fits),
+            **found.pictures,
+            verdict=found.verdict,
+            remark=remark_of(found.verdict, outcome),
+            still="",
+            alternatives=outcome.alternatives if kept.fits else [],
+            rejected=rejected_of(reference, outcome, kept, search.candidates),
+            errors=found.errors,
+            global_p_before=search.overall(search.declared),
+            global_p_after=search.overall(kept),
+            signatures=signatures_of(reference, search.declared, kept),
+            split=prepared.scene.split.text(),
+            notes=[*evidence.notes, *about_frames(prepared), *about_drifts(evidence, kept.config)],
+            input_checks=evidence.notes,
+        )
+        so_far.judged(whole)
+        seen = detectable(reference, search.declared, search.candidates) if sizes else []
+        return replace(whole, detectable=seen, facts=facts())
 
 
 def _light_facts(evidence: Evidence) -> dict[str, str]:
@@ -146,3 +176,99 @@ def _light_facts(evidence: Evidence) -> dict[str, str]:
     count = len(before.frames)
     settling = f", and {count:,} before for pixels to settle"
     return {"frames": f"{len(evidence.frames):,}" + settling * (count > 0)}
+
+
+# ---- What is known so far, told after each stage.
+
+
+_SO_FAR = (
+    "All of this may still change, most of all on the data held out, which are looked at in the"
+    " end. If adv2e runs no more, it was stopped here."
+)
+_EVERY_S = 20.0
+"""Time after which what is known is told anew at the next stage, though no effect was added."""
+
+
+class _SoFar:
+    """Tells what is known of a recording, if anybody is to know, without simulations that count.
+
+    Parameters
+    ----------
+    begun : Diagnosis
+        When nothing is known.
+    model, facts : callable
+        Return what a diagnosis says of a model, and its facts.
+    """
+
+    def __init__(
+        self,
+        begun: Diagnosis,
+        simulator: Simulator,
+        model: Callable[[Config, Sequence[Fitted]], dict[str, Any]],
+        facts: Callable[[], dict[str, str]],
+        known: Callable[[Diagnosis], None] | None,
+    ) -> None:
+        self._now, self._simulator, self._known = begun, simulator, known
+        self._model, self._facts, self._told_s = model, facts, 0.0
+
+    def _tell(self, **known: Any) -> None:
+        if self._known is not None:
+            self._now = replace(self._now, **known)
+            self._known(replace(self._now, facts=self._facts()))
+            self._told_s = time.monotonic()
+
+    def prepared(
+        self, evidence: Evidence, declared: Config, scene: Scene, streams: Sequence[Stream]
+    ) -> None:
+        """Tell of thresholds that match, or of simulations of the declared model."""
+        if self._known is None:
+            return
+        self._scene, self._measured = scene, Placed.of(evidence.stream, scene)
+        self._before = [Placed.of(stream, scene) for stream in streams]
+        checks, split = evidence.notes, scene.split.text()
+        known = {"notes": checks, "input_checks": checks, "split": split}
+        self._tell(**self._model(declared, ()), **self._pictures(self._before), **known)
+
+    def _pictures(self, after: Sequence[Placed]) -> dict[str, Any]:
+        if not after:
+            return {}
+        return pictures_of(self._scene, self._measured, self._before, after)
+
+    def changed(self, search: Search, state: State) -> None:
+        """Tell of a model that takes the place of the one before."""
+        if self._known is None:
+            return
+        after: list[Placed] = []
+        if state is not search.declared:
+            streams = drawn(self._simulator.aside(), state.config)
+            after = [Placed.of(stream, self._scene) for stream in streams]
+        self._rejections = search.reference.rejections
+        self._tell(
+            **self._model(state.config, state.fits),
+            **self._pictures(after),
+            still="searching for what is missing",
+            alternatives=state.rivals,
+            rejected=self._rejected(state.names),
+            global_p_before=search.probability(search.declared),
+            global_p_after=search.probability(state),
+            signatures=signatures_of(search.reference, search.declared, state, BOTH),
+        )
+
+    def _rejected(self, names: Sequence[str]) -> list[Rejected]:
+        return [why for name, why in self._rejections.held.items() if name not in names]
+
+    def begin(self, stage: str) -> None:
+        """Begin a stage of the search, and tell of it if nothing was told for a while."""
+        self._simulator.begin(stage)
+        if self._known is not None and time.monotonic() - self._told_s > _EVERY_S:
+            names = [one.name for one in self._now.effects]
+            self._tell(still=stage, rejected=self._rejected(names))
+
+    def judged(self, whole: Diagnosis) -> None:
+        """Tell of all but the sizes that would have been seen."""
+        self._now = whole
+        self._tell(
+            verdict="unfinished",
+            still="finding what could have been seen",
+            remark=f"The verdict will be '{whole.verdict.replace('_', ' ')}'. {whole.remark}",
+        )

@@ -69,10 +69,12 @@ def prepare(
     without: Sequence[str],
     free_thresholds: bool,
     log: Callable[[str], None],
+    tell: Callable[[Evidence, Config, Scene, Sequence[Stream]], None] = lambda *_: None,
 ) -> Prepared:
     """Simulate the declared model, so that the recording can be compared with it.
 
     Parameters as of :func:`adv2e.diagnosis.diagnose.diagnose`; the `simulator` is of the recording.
+    `tell` is called when thresholds match, and when the declared model was simulated.
     """
     scene = Scene.of_evidence(evidence, declared)
     notes = [*evidence.notes]
@@ -98,8 +100,10 @@ def prepare(
                 f"no thresholds match the totals of ON and OFF events: off by {miss:.0%}, so"
                 " something else than the thresholds makes too many or too few"
             )
+        tell(replace(evidence, notes=[*notes]), declared, scene, [])
         simulator.begin(DECLARED)
     streams = simulator.streams(declared, PILOT_SEEDS)
+    tell(replace(evidence, notes=[*notes]), declared, scene, streams)
     own_period = (
         None
         if known

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
+import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +20,7 @@ from adv2e.diagnosis.known_light import read_known_light
 from adv2e.errors import UsageError, did_you_mean
 from adv2e.options import DiagnoseOptions, EventInput, chosen, crop_of, size_of, takes
 from adv2e.process import bars
-from adv2e.reports.files import check_folder, write_reports
+from adv2e.reports.files import so_far, write_reports
 from adv2e.reports.result import Diagnosis
 
 if TYPE_CHECKING:
@@ -45,7 +47,8 @@ def diagnose(
     declared : Config, or what :func:`adv2e.load_config` takes, optional
         What is known of the camera.  A `sensor` must have the size of the recording.
     output : str or Path, optional
-        Folder for report.html, report.json and model.yaml.  Default: none is written.
+        Folder for report.html, report.json and model.yaml, which hold what is known so far until it
+        is finished (:func:`adv2e.reports.files.so_far`).  Default: none is written.
     **options
         See :class:`adv2e.options.DiagnoseOptions`, and :mod:`adv2e.diagnosis.known_light` for
         `light`.
@@ -109,10 +112,9 @@ def diagnose_file(
         if one in names():
             raise UsageError(f"--effect: {one}: a built-in effect has that name; choose another")
     declared = without_user_effects(declared, written)
-    if output is not None:
-        inputs = [recording, *([] if light is None else [light]), *also_read]
-        check_folder(output, overwrite=overwrite, inputs=inputs)
-    with _stages(options["progress"], say) as tell:
+    inputs = [recording, *([] if light is None else [light]), *also_read]
+    kept = nullcontext() if output is None else so_far(output, overwrite=overwrite, inputs=inputs)
+    with kept as known, _stages(options["progress"], say) as tell:
         evidence = (
             read_evidence(recording, declared.sensor, **reading)
             if light is None
@@ -129,13 +131,18 @@ def diagnose_file(
             written=written,
             progress=tell,
             log=log,
+            known=known,
         )
-    if output is not None:
-        write_reports(found, output, overwrite=overwrite)
+        if output is not None:
+            write_reports(found, output, overwrite=overwrite)
     return found
 
 
-SAY_EVERY_S = 30.0
+SAY_EVERY_S = 20.0
+_FEW = 50
+"""Simulations before which nobody knows how long one takes."""
+_REST = 31
+"""Columns of a bar beside the stage."""
 USUAL = 1200
 """Simulations of a diagnosis that finds its effect at once; others take up to seven times as many
 (the README of this package)."""
@@ -144,7 +151,7 @@ USUAL = 1200
 def how_far(stage: str, simulations: int, seconds: float) -> str:
     """Return the stage of a diagnosis, and an estimate of the time left."""
     text = f"{stage}: {simulations:,} simulations in {seconds:.0f} s"
-    if not simulations:
+    if simulations < _FEW:
         return text
     if simulations >= USUAL:
         return f"{text}; it takes longer where no single effect explains all"
@@ -156,25 +163,36 @@ def how_far(stage: str, simulations: int, seconds: float) -> str:
 def _stages(shown: bool, say: Callable[[str], None] | None) -> Iterator[Callable[[str, int], None]]:
     """Show a stage and the number of simulations done; how many there will be, nobody knows.
 
-    Without a bar, `say` is told the same now and then.
+    Without a bar, `say` is told the same now and then, also where no simulation ends meanwhile.
     """
-    began = said = time.monotonic()
+    began = time.monotonic()
     layout = "{desc}: {n_fmt} simulations in {elapsed}"
-    last = "reading the recording"
+    last, done, ended = "reading the recording", 0, threading.Event()
     with bars.bar(desc=last, bar_format=layout, disable=not shown) as bar:
 
         def tell(stage: str, simulations: int) -> None:
-            nonlocal last, said
+            nonlocal last, done
             bar.update(simulations - bar.n)
-            now = time.monotonic()
-            if say is not None and not shown and now - said >= SAY_EVERY_S:
-                said = now
-                say(how_far(stage, simulations, now - began))
             if stage != last:
-                bar.set_description_str(stage)
-                last = stage
+                # a line that is too long for the terminal would be drawn again below itself
+                bar.set_description_str(stage[: shutil.get_terminal_size().columns - _REST])
+            last, done = stage, simulations
 
-        yield tell
+        def follow() -> None:
+            every_s = 1.0 if shown else min(SAY_EVERY_S, threading.TIMEOUT_MAX)
+            while not ended.wait(every_s):
+                if shown:
+                    bar.refresh()
+                elif say is not None:
+                    say(how_far(last, done, time.monotonic() - began))
+
+        clock = threading.Thread(target=follow, name="adv2e-how-far", daemon=True)
+        clock.start()
+        try:
+            yield tell
+        finally:
+            ended.set()
+            clock.join()
 
 
 def check_names(without: Sequence[str], known: Sequence[str]) -> None:

@@ -167,8 +167,17 @@ def _usual() -> dict[int, Callable[[int, FrameType | None], object] | signal.Han
     return {getattr(signal, name): what for name, what in names.items() if hasattr(signal, name)}
 
 
+_also = [""]
+
+
+def say_at_end(text: str) -> None:
+    """Have the last words go on with a text, from now on."""
+    _also[0] = text
+
+
 def last_words(ending: BaseException) -> str:
-    return f"stopped by {ending}" if isinstance(ending, Terminated) else "interrupted"
+    ended = f"stopped by {ending}" if isinstance(ending, Terminated) else "interrupted"
+    return ended + _also[0]
 
 
 def _say_at_once(text: str) -> None:

@@ -1,18 +1,26 @@
-"""Files of a report, ``report.json`` and ``model.yaml`` among them: all in place, or none."""
+"""Files of a report, ``report.json`` and ``model.yaml`` among them: all in place, or none.
+
+A report that is not finished may always be replaced.
+"""
 
 from __future__ import annotations
 
 import json
 import math
+import os
 import tempfile
 import textwrap
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from adv2e.config.yaml12 import scalar_text
-from adv2e.errors import OutputError
+from adv2e.errors import Adv2eWarning, DataError, OutputError
+from adv2e.files.regular import read_text, shown
 from adv2e.files.staging import Staging, nearest_there
+from adv2e.process import signals
 from adv2e.reports.markup import plain, unit_of
 from adv2e.reports.page import page
 from adv2e.reports.quantities import interval_text, native
@@ -34,7 +42,7 @@ def check_folder(
     OutputError
         As :func:`write_reports` raises it; or one of the `inputs` would be lost.
     """
-    Staging(overwrite, inputs).folder(Path(folder), _foreign)
+    _placed(Staging(overwrite or is_unfinished(folder), inputs), Path(folder))
     above = nearest_there(Path(folder).absolute())
     try:
         with tempfile.TemporaryFile(dir=above):
@@ -46,7 +54,8 @@ def check_folder(
 def write_reports(diagnosis: Diagnosis, folder: str | Path, *, overwrite: bool = False) -> None:
     """Write ``report.html``, ``report.json`` and ``model.yaml`` into a new `folder`.
 
-    With `overwrite`, the folder of an earlier report is replaced.
+    With `overwrite`, the folder of an earlier report is replaced.  One that is not finished always
+    is; what somebody laid beside it meanwhile stays.
 
     Raises
     ------
@@ -56,20 +65,87 @@ def write_reports(diagnosis: Diagnosis, folder: str | Path, *, overwrite: bool =
     """
     texts = (page(diagnosis, folder), record_text(diagnosis), model_text(diagnosis))
     try:
-        with Staging(overwrite) as staging:
-            unfinished = staging.folder(Path(folder), _foreign)
+        with Staging(overwrite or is_unfinished(folder)) as staging:
+            paths = _placed(staging, Path(folder))
             staging.prepare()
-            unfinished.mkdir()
-            for name, text in zip(NAMES, texts, strict=True):
-                (unfinished / name).write_text(text, encoding="utf-8", newline="\n")
+            for path, text in zip(paths, texts, strict=True):
+                path.parent.mkdir(exist_ok=True)
+                path.write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from error
+
+
+def _placed(staging: Staging, folder: Path) -> list[Path]:
+    """Return the temporary names of the files of a report in a folder."""
+    if is_unfinished(folder) and _foreign(folder):
+        return [staging.file(folder / name) for name in NAMES]
+    unfinished = staging.folder(folder, _foreign)
+    return [unfinished / name for name in NAMES]
 
 
 def _foreign(folder: Path) -> str | None:
     """Name something in `folder` that no report holds."""
     names = sorted(entry.name for entry in folder.iterdir() if entry.name not in NAMES)
     return names[0] if names else None
+
+
+def is_unfinished(folder: str | Path) -> bool:
+    """Tell whether a folder holds the report of a diagnosis that is not finished."""
+    with suppress(DataError, ValueError, AttributeError):
+        return json.loads(read_text(Path(folder) / NAMES[1])).get("complete") is False
+    return False
+
+
+@contextmanager
+def so_far(
+    folder: str | Path, *, overwrite: bool = False, inputs: Iterable[str | Path] = ()
+) -> Iterator[Callable[[Diagnosis], None]]:
+    """Check `folder`, and give what writes reports on what is known so far, until one is finished.
+
+    They stand in `folder`; while an older finished report does, in ``FOLDER.unfinished`` beside it.
+    What interrupts the body leaves them, and an error does not.  Where one cannot be written, a
+    warning says so, and the work goes on.
+
+    Raises
+    ------
+    OutputError
+        As :func:`check_folder` raises it, of either folder.
+    """
+    check_folder(folder, overwrite=overwrite, inputs=inputs)
+    place, written = Path(folder), False
+    if os.path.lexists(folder) and not is_unfinished(folder):
+        older = Path(os.path.realpath(folder))
+        place = older.with_name(f"{older.name}.unfinished")
+        check_folder(place)
+
+    def write(diagnosis: Diagnosis) -> None:
+        nonlocal written
+        try:
+            write_reports(diagnosis, place)
+        except OutputError as error:
+            warnings.warn(f"what is known so far cannot be kept: {error}", Adv2eWarning, 2)
+            return
+        written = True
+        signals.say_at_end(f"; what was known by then: {shown(place / NAMES[0])}")
+
+    try:
+        yield write
+    except BaseException as error:
+        if not isinstance(error, Exception):
+            written = False
+        raise
+    finally:
+        if written:
+            signals.say_at_end("")
+            _remove_unfinished(place)
+
+
+def _remove_unfinished(folder: Path) -> None:
+    if is_unfinished(folder):
+        with suppress(OSError):  # something else may lie there by now
+            for name in NAMES:
+                (folder / name).unlink()
+            folder.rmdir()
 
 
 # ---- ``report.json``: what a diagnosis found, for programs.
@@ -111,6 +187,7 @@ def _fixed(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def _further(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
+        "complete": diagnosis.verdict != "unfinished",
         "sentence": diagnosis.sentence,
         "remark": diagnosis.remark,
         diagnosis.wording.subject: diagnosis.recording,

@@ -44,6 +44,7 @@ MARKS = {
     "partly_explained": ("◐", "Partly explained"),
     "not_identifiable": ("≟", "Not identifiable"),
     "unexplained": ("✗", "Unexplained"),
+    "unfinished": ("…", "Not finished"),
 }
 """Sign and word of each verdict."""
 
@@ -195,6 +196,8 @@ class Step:
 
 def next_steps(found: Diagnosis, folder: str | Path) -> list[Step]:
     """Return the next steps, the most useful first; `folder`: of the report."""
+    if found.verdict == "unfinished":
+        return [Step("Load this page again: it is written anew after each stage.")]
     if found.verdict == "unexplained":
         # mistakes are likelier than unknown effects
         checks = [Step(f"First check the recording: {note}.") for note in found.input_checks[:1]]

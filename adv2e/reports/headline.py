@@ -38,6 +38,9 @@ def sentence_of(found: Diagnosis) -> str:
     """
     if found.verdict == "consistent":
         return f"Nothing is missing that these data show{_errors(found)}."
+    if found.verdict == "unfinished":
+        so_far = "; ".join(_finding(one, found) for one in found.effects) or "no effect is named"
+        return f"Not finished, still {found.still}. So far: {so_far}."
     if found.verdict == "unexplained" or not found.effects:
         return f"Something is missing that no known effect explains{_most(found)}."
     text = "; ".join(_finding(one, found) for one in found.effects)

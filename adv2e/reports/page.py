@@ -39,7 +39,7 @@ def page(diagnosis: Diagnosis, folder: str | Path = ".") -> str:
         "Effects that were tried and not added": (residual.rejected(found), "paper"),
         "Which data were used": (residual.data(found), "paper"),
         "Other measures of the error": (findings.other_errors(found), "screen"),
-        "All numbers that were compared": (residual.signatures(found.signatures), "screen"),
+        "All numbers that were compared": (residual.signatures(found), "screen"),
         "How large an effect must be to be seen": (residual.detectable(found.detectable), "screen"),
         "Sizes, seeds, times and versions": (findings.facts(found.facts), "paper"),
     }
@@ -118,7 +118,7 @@ code { font: 0.92em ui-monospace, "SF Mono", Menlo, Consolas, monospace; }
   border-left: 6px solid var(--mark); border-radius: 4px;
 }
 .consistent, .explained { --mark: var(--good); }
-.partly_explained, .not_identifiable { --mark: var(--fair); }
+.partly_explained, .not_identifiable, .unfinished { --mark: var(--fair); }
 .unexplained { --mark: var(--poor); }
 .badge {
   color: var(--mark); border: 2px solid var(--mark); border-radius: 999px;

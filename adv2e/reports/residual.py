@@ -92,12 +92,14 @@ def groups(diagnosis: Diagnosis) -> Markup:
         f" simulated{models}. Far off: how many of the group differ by more than {LARGE_Z:g}"
         f" standard deviations (sd) of chance. {_meaning(diagnosis, left)}"
     )
-    caption = "Groups of numbers, on data that was not used for fitting"
+    caption = f"Groups of numbers, {diagnosis.compared}"
     return join(tag("p", lead), table(caption, columns, rows, folded_from=_GROUPS))
 
 
 def _meaning(diagnosis: Diagnosis, left: bool) -> str:
     """Return the meaning of the large residuals for this recording, in words."""
+    if diagnosis.verdict == "unfinished":
+        return "Here, what makes these differences is looked for."
     if left:
         return "Here, something that the library lacks makes these differences."
     if not diagnosis.effects:
@@ -105,8 +107,9 @@ def _meaning(diagnosis: Diagnosis, left: bool) -> str:
     return "Here, these are the marks of what was found: after it, they should be near."
 
 
-def signatures(given: Sequence[Signature]) -> Markup:
+def signatures(diagnosis: Diagnosis) -> Markup:
     """Return all statistics by kind, numbers of events first; of one kind, the farthest first."""
+    given = diagnosis.signatures
     if not given:
         return Markup()
     columns = [
@@ -123,8 +126,8 @@ def signatures(given: Sequence[Signature]) -> Markup:
         f" Beyond ±{LARGE_Z:g} (marked ▲ or ▼): {far} of {len(given)} before, {still} after."
     )
     caption = (
-        "Numbers on data that was not used for fitting: numbers of events, then times, then all"
-        " else; of each, those that differed most first"
+        f"Numbers {diagnosis.compared}: numbers of events, then times, then all else; of each,"
+        " those that differed most first"
     )
     return join(tag("p", lead), table(caption, columns, rows, folded_from=SHOWN))
 

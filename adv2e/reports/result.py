@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -217,12 +218,14 @@ class Masked:
     share: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Diagnosis:
     """Result of a diagnosis.
 
     Attributes
     ----------
+    verdict : Verdict
+        "unfinished" is none: the diagnosis goes on.
     remark : str
         What the verdict says besides :attr:`sentence`.
     recording, declared : str
@@ -260,28 +263,30 @@ class Diagnosis:
         What the declared model holds of each key that was fitted, by path; None: it is off.
     defaults : collection of str
         Those of these keys that nobody wrote: the program's defaults stand for them.
+    still : str
+        What a diagnosis that is not finished is at.
     """
 
-    verdict: Verdict
+    verdict: Verdict | Literal["unfinished"]
     remark: str
     recording: str
     declared: str
     effects: list[Finding]
-    alternatives: list[str]
+    alternatives: list[str] = field(default_factory=list)
     nuisances: Mapping[str, Any]
-    rejected: list[Rejected]
-    errors: list[ErrorRow]
-    global_p_before: float
-    global_p_after: float
-    signatures: list[Signature]
-    curves: list[Curve]
-    maps: list[ResidualMap]
-    detectable: list[Detectable]
-    masked: list[Masked]
-    split: str
-    notes: list[str]
+    rejected: list[Rejected] = field(default_factory=list)
+    errors: list[ErrorRow] = field(default_factory=list)
+    global_p_before: float = math.nan
+    global_p_after: float = math.nan
+    signatures: list[Signature] = field(default_factory=list)
+    curves: list[Curve] = field(default_factory=list)
+    maps: list[ResidualMap] = field(default_factory=list)
+    detectable: list[Detectable] = field(default_factory=list)
+    masked: list[Masked] = field(default_factory=list)
+    split: str = ""
+    notes: list[str] = field(default_factory=list)
     model: Mapping[str, Any]
-    facts: Mapping[str, str]
+    facts: Mapping[str, str] = field(default_factory=dict)
     own: Own = NO_OWN
     input_checks: Sequence[str] = ()
     wording: Wording = OF_RECORDINGS
@@ -289,6 +294,14 @@ class Diagnosis:
     defaults: Collection[str] = ()
     totals: Sequence[Total] = ()
     snapshot: Snapshot | None = None
+    still: str = ""
+
+    @property
+    def compared(self) -> str:
+        """The data whose numbers are compared."""
+        if self.verdict == "unfinished" and not self.errors:
+            return "on the data for fitting"
+        return "on data that was not used for fitting"
 
     @property
     def sentence(self) -> str:

@@ -6,15 +6,20 @@ import json
 import math
 import re
 import shutil
+import signal
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from camera import Camera, patchwork
 from camera.settings import BENCH
+from processes import running_python
 
 import adv2e as package
 from adv2e import load_config, simulate
+from adv2e.cli.options import Log
 from adv2e.diagnosis import prepare
 from adv2e.diagnosis import recordings as whole
 from adv2e.diagnosis.fitting.library import names
@@ -22,7 +27,7 @@ from adv2e.diagnosis.outcome import verdict
 from adv2e.diagnosis.selection import reference, shortlist
 from adv2e.formats.writing import open_sink
 from adv2e.geometry import Rectangle
-from adv2e.reports import summary
+from adv2e.reports import files, summary
 from adv2e.reports.files import write_reports
 
 FILES = ["model.yaml", "report.html", "report.json"]
@@ -125,6 +130,7 @@ def test_a_missing_effect_is_named_by_the_command_and_in_python_whatever_the_thr
     assert stages[:2] == ["reading the recording", "simulating the declared model"]
     assert stages[-2:] == ["judging on data not used so far", "finding what could have been seen"]
     assert "searching: fitting refractory" in stages[2:-2]
+    assert "searching: trying 3 effects: event_loss" in stages[2:-2]
     assert all(stage.startswith("searching: ") for stage in stages[2:-2])
     assert counts == sorted(counts)
     assert 300 < counts[-1] <= int(made["facts"]["simulations"])  # the last are not shown
@@ -151,6 +157,101 @@ def test_a_missing_effect_is_named_by_the_command_and_in_python_whatever_the_thr
     declared = load_config([recordings / "dead.declared.yaml"])
     held = dataclasses.replace(model.pixel, refractory=declared.pixel.refractory)
     assert held == declared.pixel
+
+
+@pytest.mark.thorough
+def test_what_is_known_is_kept_at_each_stage_and_by_an_interruption(
+    adv2e, recordings, short, tmp_path, monkeypatch
+):
+    out, beside = tmp_path / "out", tmp_path / "out.unfinished"
+    given = (recordings / "dead.zip", "-c", recordings / "dead.declared.yaml", "-o", out)
+    stop_at, seen, write = {"number": 99}, [], files.write_reports
+
+    def watched(diagnosis, folder, **options):
+        write(diagnosis, folder, **options)
+        seen.append(json.loads((Path(folder) / "report.json").read_text("utf-8")))
+        if len(seen) == stop_at["number"]:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(files, "write_reports", watched)
+    assert adv2e("diagnose", *given, *WITHOUT).status == 0
+    declared, compared, added, judged = seen
+    assert not any(one["complete"] for one in seen)
+    assert {one["verdict"] for one in seen} == {"unfinished"}
+    assert declared["signatures"] == []
+    assert len(compared["signatures"]) > 200
+    assert compared["effects"] == []
+    assert [one["name"] for one in added["effects"]] == ["refractory"]
+    assert (added["error"]["before"], judged["error"]["held_out"]) == (None, True)
+    assert added["global_p"]["before"] < 1e-6 < added["global_p"]["after"]
+    assert sorted(path.name for path in out.iterdir()) == FILES
+    whole = (out / "report.json").read_bytes()
+    assert json.loads(whole)["complete"] is True
+
+    seen.clear()
+    stop_at["number"] = 3
+    outcome = adv2e("diagnose", *given, *WITHOUT, "--overwrite")
+    assert outcome.status == 130
+    ends = f"adv2e: interrupted; what was known by then: {beside / 'report.html'}"
+    assert outcome.err.splitlines()[-1] == ends
+    assert (out / "report.json").read_bytes() == whole
+    left = json.loads((beside / "report.json").read_text("utf-8"))
+    assert (left, left["complete"]) == (seen[-1], False)
+    assert left["effects"] == added["effects"]
+    page = (beside / "report.html").read_text("utf-8")
+    assert "Not finished, still searching for what is missing. So far: dead time" in page
+    model = load_config([beside / "model.yaml"])
+    assert model.pixel.refractory.period_us == pytest.approx(DEAD_US, rel=0.05)
+
+    (tmp_path / "broken.py").write_text(BROKEN, "utf-8")
+    seen.clear()
+    broken = adv2e("diagnose", *given, *WITHOUT, "--overwrite", "--effect", tmp_path / "broken.py")
+    assert (broken.status, len(seen)) == (1, 2)
+    assert (out / "report.json").read_bytes() == whole
+    assert not beside.exists()
+
+
+INTERRUPTED = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from adv2e.cli import main
+main(sys.argv[1:])
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a process there")
+def test_an_interruption_of_the_process_leaves_a_report(recordings, tmp_path):
+    out = tmp_path / "out"
+    given = recordings / "dead.zip", "-c", recordings / "dead.declared.yaml", "-o", out, *WITHOUT
+    with running_python(INTERRUPTED, "diagnose", *given) as process:
+        while not (out / "report.json").exists():
+            assert process.poll() is None
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate()
+    assert process.returncode == 130
+    ends = f"adv2e: interrupted; what was known by then: {out / 'report.html'}"
+    assert err.decode().splitlines()[-1] == ends
+    assert sorted(path.name for path in out.iterdir()) == FILES
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert json.loads((out / "report.json").read_text("utf-8"))["complete"] is False
+
+
+def test_something_is_said_though_no_simulation_ends(adv2e, made_up, monkeypatch):
+    def waits(*_, progress, **options):
+        progress("searching: trying 2 effects: leak", 7)
+        until = time.monotonic() + 60.0
+        while len(said) < 2 and time.monotonic() < until:
+            time.sleep(0.005)
+
+    said, echo = [], Log.__call__
+    monkeypatch.setattr(
+        Log, "__call__", lambda log, text, *of: (said.append(text), echo(log, text, *of))
+    )
+    monkeypatch.setattr(whole, "SAY_EVERY_S", 0.02)
+    monkeypatch.setattr(whole, "diagnose_evidence", waits)
+    assert adv2e("diagnose", "a.zip").status == 0
+    assert [text for text in said if text.startswith("searching: trying 2 effects: leak: 7 sim")]
 
 
 def test_a_camera_as_declared_is_consistent(adv2e, recordings, short, tmp_path):

@@ -261,6 +261,20 @@ def nothing() -> Diagnosis:
     )
 
 
+def unfinished() -> Diagnosis:
+    """Return what is known while a second effect is looked for."""
+    whole = everything()
+    return replace(
+        whole,
+        verdict="unfinished",
+        still="searching: fitting leak",
+        effects=whole.effects[:1],
+        alternatives=[],
+        errors=[],
+        detectable=[],
+    )
+
+
 HOSTILE = 'a < b & "c" > \'d\' </script></title></svg><img src="http://x.y/z">\x00\n# é \udc80'
 """Text that would break pages, records and comments if it were not escaped."""
 

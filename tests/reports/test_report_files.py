@@ -7,13 +7,13 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_up_diagnosis import MODEL, everything, nothing, strange
+from made_up_diagnosis import MODEL, everything, nothing, strange, unfinished
 
 from adv2e.config import from_dict, load_config
 from adv2e.config.yaml12 import Origin, parse
-from adv2e.errors import OutputError
+from adv2e.errors import Adv2eWarning, OutputError
 from adv2e.reports import files
-from adv2e.reports.files import check_folder, model_text, write_reports
+from adv2e.reports.files import check_folder, is_unfinished, model_text, so_far, write_reports
 from adv2e.reports.quantities import native
 from adv2e.reports.result import ErrorRow, Estimate, Finding
 from adv2e.reports.summary import summary_text
@@ -83,6 +83,87 @@ def test_an_interruption_leaves_nothing(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         write_reports(everything(), tmp_path / "new" / "found")
     assert listing(tmp_path) == []
+
+
+def test_one_that_is_not_finished_is_replaced_and_what_lies_beside_it_stays(tmp_path):
+    folder = tmp_path / "found"
+    write_reports(unfinished(), folder)
+    assert is_unfinished(folder)
+    assert load_config([folder / "model.yaml"]).pixel.refractory.period_us == 6012.34
+    check_folder(folder)
+    (folder / "note.txt").write_text("mine")
+    for make in (unfinished, everything):
+        write_reports(make(), folder)
+        assert listing(folder) == [NAMES[0], "note.txt", *NAMES[1:]]
+    assert not is_unfinished(folder)
+    assert listing(tmp_path) == ["found"]
+    with pytest.raises(OutputError, match="exists already"):
+        write_reports(everything(), folder)
+
+
+@pytest.mark.parametrize("text", ["", "[1, 2]", '{"complete": 0}', "{}", None])
+def test_any_other_folder_holds_nothing_to_be_replaced(text, tmp_path):
+    if text is not None:
+        (tmp_path / "report.json").write_text(text)
+    assert not is_unfinished(tmp_path)
+
+
+@pytest.mark.parametrize("ending", [None, KeyboardInterrupt, OSError])
+@pytest.mark.parametrize("older", [None, unfinished, everything])
+def test_what_is_known_so_far_stays_if_the_work_is_interrupted(ending, older, tmp_path):
+    folder, beside = tmp_path / "found", tmp_path / "found.unfinished"
+    if older is not None:
+        write_reports(older(), folder)
+    before = record_of(folder)
+    place = beside if older is everything else folder
+    try:
+        with so_far(folder, overwrite=True) as known:
+            assert record_of(folder) == before
+            for _ in range(2):
+                known(unfinished())
+                assert is_unfinished(place)
+            if ending is not None:
+                raise ending
+            write_reports(nothing(), folder, overwrite=True)
+    except (KeyboardInterrupt, OSError) as error:
+        assert type(error) is ending
+    kept = [place.name] if ending is KeyboardInterrupt else []
+    done = ["found"] if ending is None or older is everything else []
+    assert listing(tmp_path) == sorted({*kept, *done})
+    if older is everything and ending is not None:
+        assert record_of(folder) == before
+    if ending is None:
+        assert not is_unfinished(folder)
+
+
+def record_of(folder):
+    path = folder / "report.json"
+    return path.read_bytes() if path.exists() else None
+
+
+def test_an_older_one_is_left_by_work_that_fails_before_anything_is_known(tmp_path):
+    write_reports(unfinished(), tmp_path / "found")
+    with pytest.raises(OSError, match="gone"), so_far(tmp_path / "found"):
+        raise OSError("gone")
+    assert is_unfinished(tmp_path / "found")
+
+
+def test_work_goes_on_where_what_is_known_cannot_be_kept(tmp_path):
+    with so_far(tmp_path / "found") as known:
+        (tmp_path / "found").write_text("a file meanwhile")
+        with pytest.warns(Adv2eWarning, match=r"cannot be kept: .*found: is a file"):
+            known(unfinished())
+    assert (tmp_path / "found").read_text() == "a file meanwhile"
+
+
+def test_other_things_beside_are_told_before_the_work(tmp_path):
+    write_reports(everything(), tmp_path / "found")
+    (tmp_path / "found.unfinished").mkdir()
+    with (
+        pytest.raises(OutputError, match=r"found\.unfinished: exists already"),
+        so_far(tmp_path / "found", overwrite=True),
+    ):
+        raise AssertionError("it is not begun")
 
 
 def test_errors_of_the_system_name_the_folder(tmp_path, monkeypatch):

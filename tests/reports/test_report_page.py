@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from camera.catalogue import LIBRARY
-from made_up_diagnosis import HOSTILE, everything, nothing, strange
+from made_up_diagnosis import HOSTILE, everything, nothing, strange, unfinished
 
 from adv2e.effects import separated_by
 from adv2e.reports.findings import MARKS
@@ -234,8 +234,18 @@ def test_every_verdict_has_a_sign_and_a_word(verdict):
     assert f'<span aria-hidden="true">{sign}</span> {word}</span>' in text
 
 
+def test_a_page_of_what_is_known_so_far_says_so_and_of_which_data_its_numbers_are():
+    text = Outline(page(unfinished())).text
+    assert "Not finished, still searching: fitting leak. So far: dead time: 6.0 ms" in text
+    assert "Load this page again" in text
+    assert "adv2e convert" not in text
+    assert "on the data for fitting" in text
+    assert "on data that was not used for fitting" not in text
+    assert "on data that was not used for fitting" in Outline(page(everything())).text
+
+
 def test_signs_of_unlike_verdicts_differ():
-    assert len({MARKS[name][0] for name in set(MARKS) - {"consistent"}}) == 4
+    assert len({MARKS[name][0] for name in set(MARKS) - {"consistent"}}) == 5
 
 
 def signature_names(text):

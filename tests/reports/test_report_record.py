@@ -5,7 +5,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from made_up_diagnosis import HOSTILE, everything, nothing, strange
+from made_up_diagnosis import HOSTILE, everything, nothing, strange, unfinished
 
 from adv2e.reports.files import record, record_text
 from adv2e.reports.markup import OF_RECORDINGS, OF_TABLES
@@ -82,6 +82,7 @@ def test_the_record_says_what_was_found():
     assert report["error"]["held_out"] is True
     assert report["global_p"] == {"before": 0.0002, "after": 0.34}
     assert report["nuisances"] == {"pixel.thresholds.on": 0.21, "frames.encoding": "linear"}
+    assert report["complete"] is True
     assert report["signatures"][1] == {
         "name": "share below 1 ms",
         "z_before": -38.0,
@@ -107,6 +108,16 @@ def test_an_empty_diagnosis_has_no_error():
         "name": None, "before": None, "after": None, "floor": None, "held_out": False,
     }  # fmt: skip
     assert report["global_p"] == {"before": None, "after": None}
+
+
+def test_what_is_known_so_far_is_no_verdict():
+    report = record(unfinished())
+    assert report["complete"] is False
+    assert report["verdict"] not in VERDICTS
+    assert report["sentence"].startswith(
+        "Not finished, still searching: fitting leak. So far: dead"
+    )
+    assert report["error"]["held_out"] is False
 
 
 def test_odd_numbers_are_null_and_odd_texts_survive():

@@ -66,14 +66,22 @@ class Fitter:
         self._whitening = scale.whitening if sd is None else scale.whitening / sd
         self._observed = self._whitening @ scale.of_values(observed)
 
-    def _white_of_seeds(self, configs: Sequence[Config], seeds: Sequence[int]) -> Array:
-        """Return the statistics of models, uncorrelated, (configs, seeds, statistics)."""
+    def _white_of_seeds(
+        self, configs: Sequence[Config], seeds: Sequence[int], names: Sequence[str] = ()
+    ) -> Array:
+        """Return the statistics of models, uncorrelated, (configs, seeds, statistics).
+
+        `names` of their effects are told meanwhile.
+        """
+        self._sampler.trying = dict(zip(configs, names, strict=False))
         sample = self._sampler.samples(configs, seeds)[:, :, self._view]
         return np.asarray(self.scale.of_values(sample) @ self._whitening.T)
 
-    def whites(self, configs: Sequence[Config], seeds: Sequence[int]) -> Array:
+    def whites(
+        self, configs: Sequence[Config], seeds: Sequence[int], names: Sequence[str] = ()
+    ) -> Array:
         """Return the mean statistics of models, uncorrelated, (configs, statistics)."""
-        return np.asarray(self._white_of_seeds(configs, seeds).mean(axis=1))
+        return np.asarray(self._white_of_seeds(configs, seeds, names).mean(axis=1))
 
     def at_best_starts(
         self, candidates: Sequence[Candidate], base: Config, seeds: Sequence[int]
@@ -94,7 +102,9 @@ class Fitter:
 
     def _judge(self, fits: Sequence[Fitted], seeds: Sequence[int]) -> None:
         """Set the misfit of fits where they are."""
-        for fit, mean in zip(fits, self.whites([fit.config for fit in fits], seeds), strict=True):
+        names = [fit.candidate.name for fit in fits]
+        means = self.whites([fit.config for fit in fits], seeds, names)
+        for fit, mean in zip(fits, means, strict=True):
             fit.misfit = self._misfit(fit, fit.point, mean)
 
     def misfit(self, config: Config, seeds: Sequence[int]) -> float:
@@ -122,7 +132,8 @@ class Fitter:
             for fit, points in zip(fits, nudged, strict=True)
             for point in (fit.point, *points)
         ]
-        whites = iter(self._white_of_seeds(configs, seeds))
+        names = [fit.candidate.name for fit in fits for _ in range(1 + len(fit.point))]
+        whites = iter(self._white_of_seeds(configs, seeds, names))
         moves: list[Array] = []
         for fit, points in zip(fits, nudged, strict=True):
             here = next(whites)
@@ -140,7 +151,8 @@ class Fitter:
         for share in _SHARES:
             points = [fits[k].inside(fits[k].point + share * moves[k]) for k in failed]
             tried = [fits[k].at_point(point) for k, point in zip(failed, points, strict=True)]
-            means = self.whites(tried, seeds) if tried else ()
+            names = [fits[k].candidate.name for k in failed]
+            means = self.whites(tried, seeds, names) if tried else ()
             for k, point, mean in zip(tuple(failed), points, means, strict=True):
                 fit, misfit = fits[k], self._misfit(fits[k], point, mean)
                 if misfit < fit.misfit:

@@ -102,11 +102,13 @@ def _alone(one: Rejected, declared: Config, candidates: Sequence[Candidate]) -> 
     return None
 
 
-def signatures_of(reference: Reference, declared: State, kept: State) -> list[Signature]:
-    """Return every statistic of the test data: as measured, before and after."""
-    statistics, observed = reference.sampler.statistics, reference.observed[splits.TEST]
-    of_models = [state.ensembles[splits.TEST] for state in (declared, kept)]
-    means = [reference.scales[splits.TEST].values_of(one.mean) for one in of_models]
+def signatures_of(
+    reference: Reference, declared: State, kept: State, view: int = splits.TEST
+) -> list[Signature]:
+    """Return every statistic of the test data, or of another view: as measured, before, after."""
+    statistics, observed = reference.sampler.statistics, reference.observed[view]
+    of_models = [state.ensembles[view] for state in (declared, kept)]
+    means = [reference.scales[view].values_of(one.mean) for one in of_models]
     z = [one.z(observed) for one in of_models]
     signatures = []
     for k, entry in enumerate(statistics.entries):

@@ -66,6 +66,14 @@ class _Axes:
     x_names: Sequence[str] = ()
 
 
+def pictures_of(
+    scene: Scene, measured: Placed, before: Sequence[Placed], after: Sequence[Placed]
+) -> dict[str, Any]:
+    """Return all of the picture, by the names of a diagnosis; arguments as of :func:`curves_of`."""
+    kinds = {"curves": curves_of, "maps": maps_of, "totals": totals_of, "snapshot": snapshot_of}
+    return {name: kind(scene, measured, before, after) for name, kind in kinds.items()}
+
+
 def curves_of(
     scene: Scene, measured: Placed, before: Sequence[Placed], after: Sequence[Placed]
 ) -> list[Curve]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from adv2e.diagnosis.data.scene import Placed
 from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.fitting.candidates import Candidate, neutral_value
 from adv2e.diagnosis.hints.readouts import DRIFT
-from adv2e.diagnosis.outcome.picture import curves_of, maps_of, snapshot_of, totals_of
+from adv2e.diagnosis.outcome.picture import pictures_of
 from adv2e.diagnosis.prepare import Prepared
 from adv2e.diagnosis.selection.reference import OF_RECORDINGS, Reference, State
 from adv2e.diagnosis.selection.search import PER_LOOK, Outcome, Search
@@ -28,16 +29,7 @@ from adv2e.diagnosis.statistics.summary import BOTH
 from adv2e.diagnosis.statistics.uncertainty import every
 from adv2e.effects import label_of
 from adv2e.reports.markup import known_keys
-from adv2e.reports.result import (
-    Curve,
-    Detectable,
-    ErrorRow,
-    Estimate,
-    ResidualMap,
-    Snapshot,
-    Total,
-    Verdict,
-)
+from adv2e.reports.result import Detectable, ErrorRow, Estimate, Verdict
 
 _PARTLY = 0.8
 """Share of the residual that effects must explain to be named when something is left."""
@@ -160,10 +152,12 @@ class Conclusion:
     verdict: Verdict
     kept: State
     errors: list[ErrorRow]
-    curves: list[Curve]
-    maps: list[ResidualMap]
-    totals: list[Total]
-    snapshot: Snapshot
+    pictures: dict[str, Any]
+
+
+def drawn(simulator: Simulator, config: Config, first: int = _FIRST_DRAW) -> list[Stream]:
+    """Return simulations of a model to compare with the recording."""
+    return simulator.streams(config, range(first, first + DRAWS))
 
 
 def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion:
@@ -173,28 +167,25 @@ def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion
     def test(stream: Stream) -> Stream:
         return scene.split.chosen(stream, splits.TEST)
 
-    def drawn(config: Config, of: Simulator = simulator, first: int = _FIRST_DRAW) -> list[Stream]:
-        return of.streams(config, range(first, first + DRAWS))
-
     measured = test(prepared.evidence.stream)
 
     def distances(streams: list[Stream]) -> Errors:
         return Errors.of(measured, list(map(test, streams)))
 
     kept, declared = outcome.state, search.declared
-    before = after = drawn(declared.config)
+    before = after = drawn(simulator, declared.config)
     of_before = of_after = distances(before)
     interpolated = 0.0
     if kept is not declared:
-        after = drawn(kept.config)
+        after = drawn(simulator, kept.config)
         of_after = distances(after)
         if prepared.between_frames is not None:
             bare, whole, of_whole = without_coupling(kept.config), after, of_after
             if bare != kept.config:
-                whole = drawn(bare)
+                whole = drawn(simulator, bare)
                 of_whole = distances(whole)
             with closing(simulator.of(every(prepared.evidence, 2))) as fewer:
-                half = drawn(bare, fewer, _FIRST_DRAW + DRAWS)
+                half = drawn(fewer, bare, _FIRST_DRAW + DRAWS)
             interpolated = of_interpolation(
                 measured,
                 list(map(test, whole)),
@@ -210,10 +201,7 @@ def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion
     first, second = (
         [Placed.of(stream, scene) for stream in streams] for streams in (before, after)
     )
-    seen = scene, recorded, first, second
-    return Conclusion(
-        verdict, kept, rows, curves_of(*seen), maps_of(*seen), totals_of(*seen), snapshot_of(*seen)
-    )
+    return Conclusion(verdict, kept, rows, pictures_of(scene, recorded, first, second))
 
 
 # ---- The size of each effect that would have been seen.

@@ -66,6 +66,11 @@ class State:
         """Its effects can all be undone in full: no more than usual is put down to their fit."""
         return self.left <= FITTED
 
+    @property
+    def rivals(self) -> list[str]:
+        """Effects that cannot be told from those that were added, sorted."""
+        return sorted(frozenset().union(*self.alternatives.values()) - set(self.names))
+
     def beyond(self, ground: State) -> tuple[Fitted, ...]:
         return self.fits[len(ground.fits) :]
 

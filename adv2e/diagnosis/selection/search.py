@@ -13,7 +13,7 @@ place of the first, which was added while more was missing, before a third is.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,20 +76,28 @@ class Outcome:
 
     @property
     def alternatives(self) -> list[str]:
-        alike = frozenset().union(*self.state.alternatives.values())
-        return sorted(alike - set(self.state.names))
+        return self.state.rivals
 
 
 class Search:
-    """Looks for effects that a declared model lacks; keys not known are fitted with all."""
+    """Looks for effects that a declared model lacks; keys not known are fitted with all.
 
-    def __init__(self, reference: Reference, candidates: list[Candidate]) -> None:
+    `changed` is told of the declared model, and of each that takes the place of the one before.
+    """
+
+    def __init__(
+        self,
+        reference: Reference,
+        candidates: list[Candidate],
+        changed: Callable[[Search, State], None] = lambda search, state: None,
+    ) -> None:
         unknown = {parameter.key for parameter in reference.nuisances.parameters}
         self.candidates = [
             one for one in candidates if not unknown & {each.key for each in one.parameters}
         ]
-        self.reference = reference
+        self.reference, self._changed = reference, changed
         self.declared = reference.state(reference.declared)
+        self._changed(self, self.declared)
 
     def probability(self, state: State, view: int = BOTH) -> float:
         """Return the probability of a residual as large as the recording's by chance."""
@@ -184,6 +192,7 @@ class Search:
             other = self._with_another(state) if self._may_be_wrong(state) else None
             if other is not None:
                 state = other
+                self._changed(self, state)
                 continue
             if not self._is_open(state):
                 break
@@ -197,6 +206,7 @@ class Search:
             state = grown
             probability = self.probability(state)
             self.reference.log(f"added {', '.join(state.names)}: probability {probability:.2g}")
+            self._changed(self, state)
         return state
 
     def _is_something_left(self, state: State, view: int = BOTH) -> bool:
@@ -318,6 +328,7 @@ class Search:
             if why:
                 self.reference.log(f"dropped {fit.candidate.name}: {why}")
                 self.reference.rejections.add(fit, why, final=True)
+                self._changed(self, without)
                 return self._backward(without)
         return state
 

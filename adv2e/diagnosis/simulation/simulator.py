@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import threading
 from collections.abc import Callable, Iterable, Iterator
@@ -68,6 +69,12 @@ class Simulator:
         """Return a simulator of another recording, which reports no progress."""
         return Simulator(evidence, self._threads)
 
+    def aside(self) -> Simulator:
+        """Return one of the same frames that neither counts nor tells; it is not to be closed."""
+        made = copy.copy(self)
+        made._progress = lambda stage, simulations: None
+        return made
+
     def there_and_back(self, config: Config, shift_px: tuple[float, float]) -> Simulator:
         """Return a simulator of frames that were shifted by `shift_px` and back, for `config`."""
         times_ns, light = self._light(config)
@@ -80,10 +87,11 @@ class Simulator:
     def close(self) -> None:
         self._pool.shutdown(cancel_futures=True)
 
-    def stream(self, config: Config, seed: int, *, rough: bool = False) -> Stream:
+    def stream(self, config: Config, seed: int, *, rough: bool = False, trying: str = "") -> Stream:
         """Return the events of one simulation, cut to the time that is looked at.
 
         `seed` tells simulations of one diagnosis apart, the configuration's tells diagnoses apart.
+        `trying` names the effect that it is made for, to be told.
         """
         evidence = self._evidence
         events = events_of(
@@ -94,7 +102,8 @@ class Simulator:
         )
         with self._counting:
             self.done += 1
-            self._progress(self._stage, self.done)
+            also = f": {trying}" if trying not in self._stage else ""
+            self._progress(self._stage + also, self.done)
         first, last = evidence.times_s[0] * 1e6, evidence.times_s[-1] * 1e6
         return Stream.of(events, evidence.width, evidence.height).between(first, last)
 

@@ -114,6 +114,11 @@ class Sampler:
         Taken off all statistics: what they owe to the interpolation between frames.
     is_rough : bool
         Simulations are as good as the first steps of a fit need.
+
+    Attributes
+    ----------
+    trying : dict
+        Effects that configurations stand for, to be told while they are simulated.
     """
 
     def __init__(
@@ -127,13 +132,15 @@ class Sampler:
         self.simulator, self.statistics = simulator, statistics
         self._bias, self._is_rough = bias, is_rough
         self._held: dict[tuple[Config, int], Array] = {}
+        self.trying: dict[Config, str] = {}
 
     @cached_property
     def rough(self) -> Sampler:
         return Sampler(self.simulator, self.statistics, self._bias, is_rough=True)
 
     def _measured(self, simulator: Simulator, config: Config, seed: int) -> Array:
-        stream = simulator.stream(config, seed, rough=self._is_rough)
+        trying = self.trying.get(config, "")
+        stream = simulator.stream(config, seed, rough=self._is_rough, trying=trying)
         return self.statistics.measure(stream) - self._bias
 
     def sample(self, config: Config, seeds: Sequence[int]) -> Array:

@@ -131,7 +131,7 @@ class FormulaFitter(Fitter):
         self._whitening = np.eye(2)
         self._observed = np.array(formula(*np.log(truth)))
 
-    def _white_of_seeds(self, configs, seeds):
+    def _white_of_seeds(self, configs, seeds, names=()):
         times = [np.log([c.readout.arbiter.event_ns, c.readout.arbiter.row_ns]) for c in configs]
         self.asked.append(np.array(times))
         chance = [np.random.default_rng(seed).normal(size=len(self._observed)) for seed in seeds]
