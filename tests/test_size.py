@@ -21,7 +21,7 @@ LIMITS = {
     "": 1445,
     "batches": 1340,
     "cli": 1290,
-    "comparison": 710,
+    "comparison": 1165,
     "compilation": 285,
     "config": 1300,
     "conversion": 1180,
@@ -44,7 +44,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 309
+FILES = 312
 """Most modules of all packages together."""
 
 _SLACK = 60

@@ -52,10 +52,16 @@ def command(
       adv2e compare urban.zip urban_simulated.h5
       adv2e compare urban.zip urban_simulated.h5 -c davis240c --json
       adv2e compare measured.txt simulated.txt --window 0.02
+      adv2e compare real/ made/
+      adv2e compare 'real/*.bin' 'made/*.h5'
 
     MEASURED and SIMULATED are event files of one sensor size and on one clock. The command prints
     several distances between them, each with its definition. Beside each stands the distance
     between two halves of the measured events, which is about what chance alone makes.
+
+    Or both are sets of ten recordings or more: folders, or patterns in quotation marks. The command
+    then prints how often a classifier tells a simulated recording from a measured one, and by what.
+    It does the same for windows of time of two recordings.
 
     With a configuration (-c, --set, --seed or --effect) and frames, the command also simulates the
     frames twice, with two seeds, and prints the distance between these two simulations.

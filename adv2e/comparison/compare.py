@@ -1,4 +1,4 @@
-"""Comparison of a measured and a simulated recording, and statistics of each by itself."""
+"""Comparison of a measured and a simulated recording, or of two sets; statistics of each."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from adv2e.comparison.distances import (
     Distances,
     compact,
     distances,
-    keys,
     pooled,
-    stride_of,
 )
+from adv2e.comparison.features import trains
 from adv2e.comparison.offset import latency_offset_us
+from adv2e.comparison.sets import Stream, compare_sets, members
+from adv2e.comparison.two_samples import in_windows
 from adv2e.comparison.windows import Windows, fixed_windows, frame_windows, span_of
 from adv2e.errors import DataError, UsageError, warn
 from adv2e.events import Events, Window, cut
@@ -32,7 +33,7 @@ from adv2e.formats.reading import read_events
 from adv2e.formats.recording import Recording
 from adv2e.in_python import in_python
 from adv2e.light.sensor import check_beside
-from adv2e.options import CompareOptions, EventInput, chosen, takes
+from adv2e.options import CompareOptions, EventInput, chosen, declared, takes
 from adv2e.sources import PICTURES, VIDEO_SUFFIXES
 from adv2e.sources.times.rates import seconds
 
@@ -80,22 +81,13 @@ def stream_statistics(
     counts = count, on, count - on
     values: list[float | None] = [*counts, *(n / exposure for n in counts)]
     values.append(on / count if count else None)
-    times = inter_event_times(events, width)
+    _, times = trains(events, width)
     if len(times):
         values += map(float, np.percentile(times, QUANTILES))
         values.append(float(np.mean(times < SHORT_US)))
     else:  # no pixel fired twice
         values += [None] * (len(QUANTILES) + 1)
     return dict(zip(STATISTICS, values, strict=True))
-
-
-def inter_event_times(events: Events, width: int) -> NDArray[np.int64]:
-    """Return the inter-event times of all pixels [us], in no useful order."""
-    start, stride = stride_of(events)
-    ordered = np.sort(keys(events, width, start, stride))
-    same_pixel = ordered[1:] // stride == ordered[:-1] // stride
-    times: NDArray[np.int64] = np.diff(ordered)[same_pixel]
-    return times
 
 
 # ---- Noise floor of the distances: what they come to where nothing but chance differs.
@@ -157,8 +149,8 @@ TWO_SEEDS = (
 
 @takes(CompareOptions)
 def compare(
-    measured: str | Path | Recording,
-    simulated: str | Path | Recording,
+    measured: Stream | Sequence[Stream],
+    simulated: Stream | Sequence[Stream],
     config: Written | Sequence[Written] | None = None,
     *,
     frame_times_ns: NDArray[np.int64] | None = None,
@@ -170,8 +162,10 @@ def compare(
 
     Parameters
     ----------
-    measured, simulated : str, Path or Recording
+    measured, simulated : str, Path or Recording, or a sequence of them
         Two recordings of one size on one clock: files, or what :func:`adv2e.read_events` returned.
+        Or two sets of recordings of one size: sequences, folders, or patterns such as ``a/*.h5``.
+        Of sets, a classifier tells how far they can be told apart, and nothing else is returned.
     config : Config, or what :func:`adv2e.load_config` takes, optional
         With it the frames are simulated, by its seed and by the next one, for the floor of two
         seeds.
@@ -189,7 +183,10 @@ def compare(
     ------
     DataError
         Sizes differ, a stream is empty, or the streams have no whole window in common; a file
-        cannot be read; there are no frames to simulate, or they have another size.
+        cannot be read; there are no frames to simulate, or they have another size; a set has too
+        few recordings.
+    UsageError
+        One is a set and the other is not, or an option is of two recordings alone.
 
     Examples
     --------
@@ -202,6 +199,8 @@ def compare(
     >>> found["measures"]["relative_5_bins"]["value"] < 0.5
     True
     """
+    if sets := _sets(measured, simulated, config, frame_times_ns, options):
+        return {**compare_sets(sets, _readers(options, reading), doubt), "warning": WARNING}
     read = [not isinstance(one, Recording) for one in (measured, simulated)]
     measured, simulated, source = _opened(measured, simulated, options, reading)
     for line in source.doubts if source else ():
@@ -221,10 +220,12 @@ def compare(
     (ours, theirs), *kept = compact([measured.events, simulated.events], *size)
     found = distances(ours, theirs, windows, *kept)
     floors = {"half_split": half_split(ours, windows, *kept)}
+    drawn = None
     if again is not None:
         simulate_events, seeds = again
-        one, other = map(simulate_events, seeds)
+        drawn = one, other = [simulate_events(seed) for seed in seeds]
         floors["two_seeds"] = distances(one, other, windows, *size, whole=measured.events).values
+    streams = measured.events, simulated.events
     for stream in compress((measured, simulated), read):
         for problem in stream.problems:
             doubt(f"{stream.path}: {problem}")
@@ -238,6 +239,7 @@ def compare(
             "edges_us": [*(start for start, _ in windows.used), windows.stop],
         },
         "measures": {name: _measure(name, found, floors) for name in MEASURES},
+        "told_apart": in_windows(streams, windows, size, drawn),
         "statistics": _statistics(measured, simulated, windows),
         "floors": {
             "half_split": HALF_SPLIT,
@@ -247,9 +249,43 @@ def compare(
     }
 
 
+def _sets(
+    measured: Stream | Sequence[Stream],
+    simulated: Stream | Sequence[Stream],
+    config: Any,
+    frame_times_ns: Any,
+    options: CompareOptions,
+) -> tuple[list[Stream], list[Stream]] | None:
+    """Return two sets of recordings, None where there are two recordings."""
+    sets = members(measured), members(simulated)
+    if sets == (None, None):
+        return None
+    if sets[0] is None or sets[1] is None:
+        which = "MEASURED" if sets[0] is None else "SIMULATED"
+        raise UsageError(f"{which}: is one recording, and the other is a set: give two of a kind")
+    single: dict[str, Any] = {"-c": config, "frame_times_ns": frame_times_ns}
+    alone = ("window_s", "frames", "start_s", "stop_s")
+    single |= {declared(CompareOptions)[one].flag_of(one): options.get(one) for one in alone}
+    for flag in (flag for flag, value in single.items() if value is not None):
+        raise UsageError(f"{flag} is of two recordings, not of two sets of them: leave it out")
+    return sets[0], sets[1]
+
+
+def _readers(
+    options: CompareOptions, reading: Reading
+) -> tuple[Callable[[Stream], Recording], Callable[[Stream], Recording]]:
+    """Return what reads a recording of the measured and of the simulated set."""
+    given = chosen(EventInput, options)
+    of_simulated: EventInput = {**given, "rotate180": False, "track": None}
+    return (
+        lambda stream: _read(stream, given, reading),
+        lambda stream: _read(stream, of_simulated, reading),
+    )
+
+
 def _opened(
-    measured: str | Path | Recording,
-    simulated: str | Path | Recording,
+    measured: Any,
+    simulated: Any,
     options: CompareOptions,
     reading: Reading,
 ) -> tuple[Recording, Recording, Source | None]:
@@ -274,7 +310,7 @@ def _opened(
     )
 
 
-def _read(stream: str | Path | Recording, given: EventInput, reading: Reading) -> Recording:
+def _read(stream: Stream, given: EventInput, reading: Reading) -> Recording:
     if isinstance(stream, Recording):
         return stream
     with reading(stream) as progress:

@@ -12,20 +12,51 @@ _WIDTH = 100
 
 def text(report: dict[str, Any]) -> str:
     """Return the dictionary of :func:`adv2e.comparison.compare.compare` as lines of text."""
+    if "measures" not in report:
+        return _sets(report)
     seeds = report["floors"]["two_seeds"] is not None
     lines = [_stream(name, report[name]) for name in ("measured", "simulated")]
     lines += [_windows(report["windows"]), ""]
     lines += _measures(report["measures"], seeds)
-    lines += [*_scales(report["measures"]["error"]), ""]
+    lines += [*_scales(report["measures"]["error"]), "", *_told_apart(report["told_apart"]), ""]
     lines += _statistics(report["statistics"])
     lines += ["", "What each distance is"]
     for name, measure in report["measures"].items():
         lines += _paragraph(name, measure["definition"])
+    lines += _paragraph("told_apart", report["told_apart"]["definition"])
     lines += ["", "What each floor is"]
     for name, definition in report["floors"].items():
         if definition is not None:
             lines += _paragraph(name, definition)
     return "\n".join([*lines, "", report["warning"]])
+
+
+def _sets(report: dict[str, Any]) -> str:
+    lines = [
+        f"{name:<11}{one['recordings']} recordings of {one['width']}x{one['height']} pixels,"
+        f" {one['events']:,} events"
+        for name, one in ((name, report[name]) for name in ("measured", "simulated"))
+    ]
+    lines += [f"{'compared':<11}{report['pairs']} pairs have one name", ""]
+    lines += [*_told_apart(report["told_apart"]), ""]
+    lines += _paragraph("told_apart", report["told_apart"]["definition"])
+    lines += _paragraph("half_split", report["floors"]["half_split"])
+    return "\n".join([*lines, "", report["warning"]])
+
+
+def _told_apart(told: dict[str, Any]) -> list[str]:
+    """Return how far the two can be told apart, and by what if they can."""
+    if told["value"] is None:
+        return textwrap.wrap(f"told_apart: none, as {told['why_none']}", _WIDTH)
+    low, high = told["interval_95"]
+    floors = ", ".join(f"{k} {v:.2f}" for k, v in told["floor"].items() if v is not None)
+    lines = [
+        f"{'told_apart':<28}{told['value']:>10.2f}  ({low:.2f} to {high:.2f};"
+        f" floor: {floors or '-'}; 0.50: cannot be told)"
+    ]
+    largest = told["differences"]["largest"]
+    lines += ["  simulated against measured, where they differ most:"] * bool(largest)
+    return lines + [f"    {one['text']}" for one in largest]
 
 
 def _stream(name: str, stream: dict[str, Any]) -> str:

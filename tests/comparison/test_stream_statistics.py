@@ -3,13 +3,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adv2e.comparison.compare import inter_event_times, stream_statistics
+from adv2e.comparison.compare import stream_statistics
+from adv2e.comparison.features import trains
 from adv2e.events import empty_events, make_events
 
 
 def test_times_run_to_the_next_event_of_the_same_pixel_of_either_polarity():
     events = make_events([0, 100, 500, 1600, 2000], [3, 4, 3, 3, 4], [2] * 5, [1, 1, 0, 1, 1])
-    assert sorted(inter_event_times(events, 12).tolist()) == [500, 1100, 1900]
+    counts, times = trains(events, 12)
+    assert sorted(times.tolist()) == [500, 1100, 1900]
+    assert sorted(counts.tolist()) == [2, 3]
 
 
 def test_times_are_those_of_a_loop_over_the_events(events):
@@ -19,7 +22,9 @@ def test_times_are_those_of_a_loop_over_the_events(events):
         if place in last:
             expected.append(event["t"] - last[place])
         last[place] = event["t"]
-    assert sorted(inter_event_times(events, 12)) == sorted(expected)
+    counts, times = trains(events, 12)
+    assert sorted(times) == sorted(expected)
+    assert sorted(counts) == sorted(np.unique(events[["x", "y"]], return_counts=True)[1])
 
 
 def test_quantiles_and_short_share():

@@ -19,6 +19,8 @@ from pictures import picture
 
 from adv2e.config import load_config
 from adv2e.conversion.demo import run_demo
+from adv2e.events import make_events
+from adv2e.formats.writing import open_sink
 from adv2e.synthetic import Scene
 from adv2e.synthetic.scene import write_video
 
@@ -97,6 +99,17 @@ def _record(effect: str, path: Path) -> None:
     shutil.copy(path.with_suffix(".declared.yaml"), path.with_name("declared.yaml"))
 
 
+def recordings(path: Path) -> None:
+    """Make a folder of a dozen recordings of events."""
+    path.mkdir()
+    draw = np.random.default_rng(len(path.name))
+    for number in range(12):
+        t = np.sort(draw.integers(0, 100_000, 400))
+        x, y, p = (draw.integers(0, most, 400) for most in (8, 6, 2))
+        with open_sink(path / f"{number:03d}.npz", width=8, height=6, metadata={}) as sink:
+            sink.write_events(make_events(t, x, y, p))
+
+
 def latencies(path: Path) -> None:
     """Make a table of latencies of two cameras."""
     head = "camera,bias,polarity,irradiance_W_m2,latency_us,latency_error_us\n"
@@ -129,6 +142,8 @@ INPUTS: dict[str, Callable[[Path], None]] = {
     "clip.npy": stack,
     "recording.zip": recording,
     "echo.zip": echoing,
+    "real/": recordings,
+    "made/": recordings,
     "latency.csv": latencies,
     "noise.csv": noise_rates,
 }
