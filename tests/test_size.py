@@ -31,7 +31,7 @@ LIMITS = {
     "files": 780,
     "formats": 5055,
     "inspection": 260,
-    "kernel": 5640,
+    "kernel": 5880,
     "light": 865,
     "motion": 350,
     "pixel": 575,
@@ -44,7 +44,11 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
+<<<<<<< HEAD
 FILES = 312
+=======
+FILES = 311
+>>>>>>> df43a16d (Noise of the first second is that of all others)
 """Most modules of all packages together."""
 
 _SLACK = 60

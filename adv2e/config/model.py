@@ -195,8 +195,8 @@ class Pixel(Section):
     initial_reference: str = parameter(
         RUNNING,
         unit="-",
-        meaning="reference at the first frame; running: where leak has carried it, in a camera that"
-        " was on before; settled: the signal; random: uniform between the thresholds",
+        meaning="reference at the first frame; running: where leak and noise have brought it, in a"
+        " camera that was on before; settled: the signal; random: uniform between the thresholds",
         choices=REFERENCES,
     )
     dark_current: DarkCurrent | None = subsection(

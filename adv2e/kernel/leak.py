@@ -106,11 +106,12 @@ def lower_references(i, b, count, state, memory):
 @kernel
 def _factor(seed, jitter, i, draw):
     """Leak speed of one cycle of pixel i, relative to the nominal one."""
-    return 1.0 / (1.0 + jitter * _cut(rng.normal(seed, rng.LEAK_PERIOD, i, draw)))
+    return 1.0 / (1.0 + jitter * cut(rng.normal(seed, rng.LEAK_PERIOD, i, draw)))
 
 
 @kernel
-def _cut(g):
+def cut(g):
+    """Cut a deviation of a period."""
     return min(max(g, -_MOST), _MOST)
 
 
@@ -138,23 +139,12 @@ def _met(dead, noise, period):
 
 
 @kernel
-def _crossed(to_level, left, noise, corner, speed):
-    """Return the expected number of crossings by photoreceptor noise in this leak cycle.
-
-    to_level, left : distance of the threshold [ln] at the start of the cycle and now; speed : of
-    the reference [ln/us].
-    """
-    first, now = max(to_level / noise, 0.0), max(left / noise, 0.0)
-    passed = math.exp(-0.5 * now * now) - math.exp(-0.5 * first * first)
-    return corner * noise / speed * passed / math.sqrt(2.0 * math.pi)
-
-
-@kernel
 def fill_running(lo, hi, circuit, start, light, level, state):
     """Put the pixels lo..hi somewhere in their leak cycles at `start` [us].
 
-    Their references are those right after an event, beside signals at rest; `light` (pixels,) is
-    what they have seen [DN], `level` (pixels,) the factor on the ON threshold.
+    Their references are those right after an event, beside signals at rest without photoreceptor
+    noise; `light` (pixels,) is what they have seen [DN], `level` (pixels,) the factor on the ON
+    threshold.
     """
     seed, jitter, dead = circuit.seed, circuit.leak_jitter, circuit.dead_time
     for i in range(lo, hi):
@@ -171,7 +161,7 @@ def fill_running(lo, hi, circuit, start, light, level, state):
             for draw in range(_TRIES):
                 slowness = 1.0
                 if jitter > 0.0:
-                    slowness += jitter * _cut(rng.normal(seed, rng.LEAK_RUNNING, i, draw))
+                    slowness += jitter * cut(rng.normal(seed, rng.LEAK_RUNNING, i, draw))
                 period = way / rate * slowness
                 mean = _met(dead, noise, period)
                 u, v = rng.uniforms(seed, rng.LEAK_AGE, i, draw)
@@ -184,19 +174,6 @@ def fill_running(lo, hi, circuit, start, light, level, state):
                 if noise > 0.0:
                     age = -math.log1p(-noise * age) / noise
                 fallen = way * min(age / period, 1.0) - circuit.overshoot
-                if circuit.noise_rms > 0.0:
-                    on, now = state[per_pixel.ON, i], state[per_pixel.SEEN, i]
-                    rms, corner = circuit.noise_rms, circuit.dark + circuit.per_dn * light[i]
-                    if circuit.follower > 0.0:  # the slower of two poles decides
-                        rms *= math.sqrt(circuit.follower / (circuit.follower + corner))
-                        corner = min(corner, circuit.follower)
-                    crossed = _crossed(
-                        on * way + now, on * (level[i] - fallen) + now, rms, corner,
-                        on * way / period,
-                    )  # fmt: skip
-                    if u * most >= mean * math.exp(-crossed):
-                        fallen = 0.0
-                        continue
                 factor = 1.0 / slowness
                 break
         state[per_pixel.REFERENCE, i] -= fallen * state[per_pixel.ON, i]

@@ -107,20 +107,25 @@ def fill_first_hot_times(seed, fraction, rate, spread, start, times):
 
 
 @kernel
-def fill_first_noise(seed, rms, noise):
-    """Draw the noise of every pixel at the start from its stationary distribution."""
-    for i in range(noise.shape[0]):
-        noise[i] = rms * rng.normal(seed, rng.PHOTORECEPTOR, i, 0)
+def stationary_noise(i, draw, share, circuit):
+    """Draw the noise of pixel i before and behind the second pole, as it is at any moment.
+
+    Both are jointly stationary: behind a pole of corner f2, noise of corner f1 keeps the share
+    f2/(f1 + f2) of its variance, and the covariance of both is that same share.
+    """
+    noise = seen = circuit.noise_rms * rng.normal(circuit.seed, rng.PHOTORECEPTOR, i, draw)
+    if circuit.follower > 0.0:
+        own = circuit.noise_rms * math.sqrt(share * (1.0 - share))
+        seen = share * noise + own * rng.normal(circuit.seed, rng.PHOTORECEPTOR_BEHIND, i, draw)
+    return noise, seen
 
 
 @kernel
-def fill_first_seen(seed, rms, follower, corner, noise, seen):
-    """Draw every pixel's noise behind the second pole at the start, given that before it.
-
-    Both are jointly stationary: behind a pole of corner f2 [rad/us], noise of corner f1 keeps the
-    share c = f2/(f1 + f2) of its variance, and the covariance of both is that same share.
-    """
-    for i in range(noise.shape[0]):
-        share = follower / (follower + corner[i])
-        own = rms * math.sqrt(share * (1.0 - share))
-        seen[i] = share * noise[i] + own * rng.normal(seed, rng.PHOTORECEPTOR_BEHIND, i, 0)
+def fill_first_noise(lo, hi, circuit, light, state):
+    """Draw the noise of the pixels lo..hi in `light` [DN]; their references are the signal."""
+    for i in range(lo, hi):
+        corner = circuit.dark + circuit.per_dn * light[i]
+        share = circuit.follower / (circuit.follower + corner)
+        noise, seen = stationary_noise(i, 0, share, circuit)
+        state[per_pixel.NOISE, i], state[per_pixel.SEEN, i] = noise, seen
+        state[per_pixel.REFERENCE, i] += seen

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from adv2e.causes import FRAME_COUPLING
 from adv2e.config.model import Pixel, Sampling
-from adv2e.effects.hooks import Hooks
+from adv2e.effects.hooks import LONGEST_US, Hooks
 from adv2e.effects.pixel.initial_reference import RANDOM, RUNNING
 from adv2e.effects.pixel.low_pass import UPDATES
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
@@ -27,11 +27,15 @@ from adv2e.kernel.noise import (
     fill_first_candidates,
     fill_first_hot_times,
     fill_first_noise,
-    fill_first_seen,
 )
 from adv2e.kernel.per_pixel import fill_levels, fill_random_reference
+from adv2e.kernel.photoreceptor.exits import exits
+from adv2e.kernel.photoreceptor.law import noise_of
+from adv2e.kernel.photoreceptor.running import fill_running_noise
 from adv2e.kernel.stepped.signal import log_of_light
 from adv2e.pixel.steps import Stepping
+
+_State = NDArray[np.float64]
 
 
 def initial_state(
@@ -41,7 +45,7 @@ def initial_state(
     start: float,
     stepping: Stepping | None,
     threads: int,
-) -> NDArray[np.float64]:
+) -> _State:
     """Return the state of all pixels before the first frame, (rows of the state, pixels).
 
     `first` is the light of the first frame [DN] at `start` us; `stepping` that of a circuit that is
@@ -72,73 +76,54 @@ def initial_state(
         fill_first_hot_times(seed, share, rate, spread, start, times)
     if stepping is not None:
         _rest_poles(state, stepping)
-    if circuit.noise_rms > 0:
-        _start_noise(state, circuit, stepping, light)
+    lit, on_level, off_level = light, np.ones(first.size), np.ones(first.size)
+    if stepping is not None:
+        lit = stepping.first_light(light)
+        on_level *= stepping.first_level("on")
+        off_level *= stepping.first_level("off")
+    noise, running = circuit.noise_rms > 0, pixel.initial_reference == RUNNING
+    if noise and running:
+        cell, tables = noise_of(circuit, 0.0, LONGEST_US).cell, exits()
+        fill(fill_running_noise, circuit, cell, start, lit, on_level, off_level, tables, state)
+    elif noise:
+        fill(fill_first_noise, circuit, lit, state)
+    if noise and stepping is not None:
+        state[per_pixel.SECOND] += state[per_pixel.SEEN]
     reset = state[per_pixel.REFERENCE].copy() if circuit.causes else None
-    leaks = circuit.leak > 0 or circuit.photo_leak > 0
-    if leaks and pixel.initial_reference == RUNNING:
-        level = np.ones(first.size)
-        if stepping is not None:
-            light, level = stepping.first_light(light), level * stepping.first_level()
-        fill(fill_running, circuit, start, light, level, state)
-    elif circuit.leak_jitter > 0:
+    if running and not noise and (circuit.leak > 0 or circuit.photo_leak > 0):
+        fill(fill_running, circuit, start, lit, on_level, state)
+    elif circuit.leak_jitter > 0 and not (noise and running):
         fill_first_factors(seed, circuit.leak_jitter, state[per_pixel.LEAK_FACTOR])
     if reset is not None:
-        _note_resets(state, circuit, stepping, reset)
+        added = 0.0 if stepping is None else stepping.first_signal()
+        state[per_pixel.RESET_ADDED] = added
+        if noise and running:
+            state[per_pixel.RESET_LIGHT] -= added
+        else:
+            _note_resets(state, circuit, reset)
     return state
 
 
-def _note_resets(
-    state: NDArray[np.float64],
-    circuit: Circuit,
-    stepping: Stepping | None,
-    reference: NDArray[np.float64],
-) -> None:
+def _note_resets(state: _State, circuit: Circuit, reference: _State) -> None:
     """Fill the rows that causes follow from; `reference`: without what leak has done before.
 
     Where references are random, the light has moved from there.
     """
     seen = state[per_pixel.SEEN]
-    added = 0.0 if stepping is None else stepping.first_signal()
-    state[per_pixel.RESET_LIGHT] = reference - seen - added
+    state[per_pixel.RESET_LIGHT] = reference - seen - state[per_pixel.RESET_ADDED]
     state[per_pixel.RESET_NOISE] = seen
-    state[per_pixel.RESET_ADDED] = added
     began = state[per_pixel.REFERENCE] != reference  # a cycle, by a reset
     beyond = np.where(began, circuit.overshoot * state[per_pixel.ON], 0.0)
     held = state[per_pixel.HOLD] >= 0.0
     state[per_pixel.RESET] = np.where(held, per_pixel.NEVER, reference + beyond)
 
 
-def _rest_poles(state: NDArray[np.float64], stepping: Stepping) -> None:
+def _rest_poles(state: _State, stepping: Stepping) -> None:
     """Fill the rows of a state that only steps of time have; all poles are at rest."""
     driven = stepping.first_driven(state[per_pixel.X])
     state[per_pixel.FIRST] = driven
     state[per_pixel.SECOND] = driven
     state[per_pixel.REFERENCE] += driven - state[per_pixel.X] + stepping.first_signal()
-
-
-def _start_noise(
-    state: NDArray[np.float64],
-    circuit: Circuit,
-    stepping: Stepping | None,
-    light: NDArray[np.float64],
-) -> None:
-    """Fill the rows of photoreceptor noise, which was there before the first frame.
-
-    A second pole without it, and references in the middle of its course, would take seconds to
-    forget that.
-    """
-    noise = state[per_pixel.NOISE]
-    fill_first_noise(circuit.seed, circuit.noise_rms, noise)
-    seen = noise.copy()
-    if circuit.follower > 0:
-        lit = light if stepping is None else stepping.first_light(light)
-        corner = circuit.dark + circuit.per_dn * lit
-        fill_first_seen(circuit.seed, circuit.noise_rms, circuit.follower, corner, noise, seen)
-    state[per_pixel.SEEN] = seen
-    state[per_pixel.REFERENCE] += seen
-    if stepping is not None:
-        state[per_pixel.SECOND] += seen
 
 
 def _over_pixels(threads: int, pixels: int, fill: Callable[..., None], *arguments: Any) -> None:

@@ -159,9 +159,9 @@ class Stepping:
         gain = self._course("gain", np.array([self._start]))
         return gain[0] * light if gain.size else light
 
-    def first_level(self) -> NDArray[Any]:
-        """Return the factor on the ON thresholds at the first frame, (1,) or (pixels,)."""
-        factors = self._factors("on", np.array([self._start]))
+    def first_level(self, name: str) -> NDArray[Any]:
+        """Return the factor on the thresholds `name` at the first frame, (1,) or (pixels,)."""
+        factors = self._factors(name, np.array([self._start]))
         return factors[0] if factors.size else np.ones(1)
 
     def first_signal(self) -> NDArray[Any]:

@@ -318,7 +318,8 @@ def test_noise_of_next_to_nothing_leaves_events_where_they_are(name):
     found = []
     for noise in (None, PhotoreceptorNoise(rms=1e-7)):
         array = start(
-            stack, times, Pixel(**CASES[name], photoreceptor_noise=noise), seed=3,
+            stack, times,
+            Pixel(**CASES[name], photoreceptor_noise=noise, initial_reference="settled"), seed=3,
             exact_times=True, method="auto" if noise else "stepped",
         )  # fmt: skip
         found.append(advance(array, stack, times))

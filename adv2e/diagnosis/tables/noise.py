@@ -47,13 +47,13 @@ from numpy.typing import NDArray
 
 from adv2e.diagnosis.tables.threshold_noise import (
     HIGHEST,
-    SAMPLING_SHIFT,
     event_rates,
     lagrange_weights,
 )
 from adv2e.effects.hooks import LONGEST_US
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
 from adv2e.effects.pixel.thresholds import FLOOR
+from adv2e.kernel.photoreceptor.exits import SAMPLING_SHIFT
 
 Array = NDArray[np.float64]
 

@@ -42,9 +42,10 @@ stays on a lattice for long, and rates are up to ten times as high as where thre
 tenth of the noise or more.  With leak, ON events of our pixel came at 0.96 to 1.03 of these rates,
 OFF events at 0.93 to 1.2 (the latter where nearly all events are by leak).
 
-These are rates long after the start.  Only leak and noise take references anew, and till then rates
-are those of references taken at random moments of the noise: of a pixel without leak that has
-0.02 events a second, four times as many come in the first seconds, twice as many after a minute.
+These are rates of a pixel that has run for long.  Only leak and noise take references anew, and
+till then rates are those of references taken at random moments of the noise: of a settled pixel
+without leak that has 0.02 events a second, four times as many come in the first seconds, twice as
+many after a minute.  Tables of this law, and a draw from it: :mod:`adv2e.kernel.photoreceptor`.
 
 References
 ----------
@@ -66,28 +67,28 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.kernel.photoreceptor.exits import (
+    COMPARABLE_POLES,
+    FARTHEST,
+    POLE_SHIFT,
+    RAYLEIGH,
+    SHIFTS,
+    STEP,
+    integrals,
+    shifts,
+)
+
 Array = NDArray[np.float64]
 
-SAMPLING_SHIFT = 0.5826
-"""-zeta(1/2)/sqrt(2 pi): how far sampling moves a level, in standard deviations of one step."""
-POLE_SHIFT = 1.4604
-"""-zeta(1/2): how far a fast second pole moves a level, in units of sqrt(rho)."""
 HIGHEST = 8.0
 """Thresholds above this many standard deviations count as this: events of 1e-14 a unit of time."""
 
-_COMPARABLE_POLES = 0.13
-"""Fitted: what poles of comparable corners bring a level nearer, times rho e^{-level/2}."""
 _BLUR = 0.02
 """Spread of the reference that is always there: else it may stay on a lattice for ever."""
-_RAYLEIGH = np.sqrt(0.5 * np.pi)
-"""Mean speed at which a high level is crossed, in standard deviations of the speed."""
 
 _PLACES = 47
 """Values of the reference; with more, the linear algebra starts threads."""
 _BEYOND = 3.5
-_FARTHEST = 26.0
-_FINE = np.linspace(-_FARTHEST, _FARTHEST, 5201)
-_STEP = float(_FINE[1] - _FINE[0])
 
 
 def _normal_nodes(count: int) -> tuple[Array, Array]:
@@ -107,52 +108,19 @@ _SUBSTEPS = 4
 """Parts of the way from place to place as the reference leaks."""
 
 
-def _integrals() -> Array:
-    """Return S, m from there to infinity, m up to there, and the integral of S m, (places, 4).
-
-    S is summed outwards and m inwards, as both change by many orders of magnitude.
-    """
-
-    def outwards(values: Array) -> Array:
-        parts, middle = 0.5 * _STEP * (values[1:] + values[:-1]), _FINE.size // 2
-        below = -np.cumsum(parts[:middle][::-1])[::-1]
-        return np.concatenate([below, [0.0], np.cumsum(parts[middle:])])
-
-    scale, speed = outwards(np.exp(0.5 * _FINE**2)), np.exp(-0.5 * _FINE**2)
-    parts = 0.5 * _STEP * (speed[1:] + speed[:-1])
-    above = np.concatenate([np.cumsum(parts[::-1])[::-1], [0.0]])
-    return np.stack([scale, above, above[::-1], outwards(scale * speed)], axis=1)
-
-
-def _shifts() -> tuple[Array, Array]:
-    """Return values of u, and h there."""
-    u, count = np.linspace(-30.0, 30.0, 6000), 256  # an even number leaves out 0
-    n = np.arange(1, count + 1)
-    total = 2.0 * np.arcsinh(u[:, None] / (2.0 * np.sqrt(n))).sum(axis=1)
-    last = np.arcsinh(u / (2.0 * np.sqrt(count)))
-    # the rest of the sum by its integral (Euler and Maclaurin)
-    integral = 2.0 * count * last + u * (np.sqrt(count + 0.25 * u * u) - 0.5 * np.abs(u))
-    slope = -0.5 * u / (count * np.sqrt(count + 0.25 * u * u))
-    limit = total - integral - last - slope / 12.0 - 0.5 * u * np.abs(u)
-    return u, -limit / u - 0.5 * u
-
-
-_INTEGRALS = _integrals()
-_U, _H = _shifts()
-
-
 def _looked_up(x: Array) -> list[Array]:
-    place = (np.clip(x, -_FARTHEST, _FARTHEST - 1e-9) + _FARTHEST) / _STEP
+    place = (np.clip(x, -FARTHEST, FARTHEST - 1e-9) + FARTHEST) / STEP
     below = place.astype(np.int64)
     share = (place - below)[..., None]
-    values = _INTEGRALS[below] * (1.0 - share) + _INTEGRALS[below + 1] * share
+    table = integrals()
+    values = table[below] * (1.0 - share) + table[below + 1] * share
     return list(np.moveaxis(values, -1, 0))
 
 
 def _seen_by_slow_part(level: Array, ratio: float) -> Array:
     root = np.sqrt(ratio)
-    comparable = _COMPARABLE_POLES * ratio * np.exp(-0.5 * np.maximum(level, 0.0))
-    moved: Array = level + root * np.interp(level * root, _U, _H) - comparable
+    comparable = COMPARABLE_POLES * ratio * np.exp(-0.5 * np.maximum(level, 0.0))
+    moved: Array = level + root * np.interp(level * root, SHIFTS, shifts()) - comparable
     return moved
 
 
@@ -258,9 +226,9 @@ def _drift(
 def _landings(levels: Array, ways: Array, dead_time: float, ratio: float) -> tuple[Array, Array]:
     """Return z, (levels, landings), and y, (levels, landings, slow), where dead times end."""
     # a low level is crossed faster, as mostly fast noise crosses it
-    speed = _RAYLEIGH + (POLE_SHIFT - _RAYLEIGH) * np.exp(-np.abs(levels) * np.sqrt(ratio))
+    speed = RAYLEIGH + (POLE_SHIFT - RAYLEIGH) * np.exp(-np.abs(levels) * np.sqrt(ratio))
     ahead = ways * np.sqrt(ratio) * speed
-    spread = ratio * (2.0 - 0.5 * np.pi) * (speed / _RAYLEIGH) ** 2
+    spread = ratio * (2.0 - 0.5 * np.pi) * (speed / RAYLEIGH) ** 2
     slow = np.exp(-dead_time)
     fast = np.exp(-dead_time / ratio) if ratio > 0.0 else 0.0
     follows = dead_time * slow if abs(1.0 - ratio) < 1e-6 else (slow - fast) / (1.0 - ratio)

@@ -28,8 +28,7 @@ noise event ends it.  The age a of the cycle is drawn from a density proportiona
     p(T) exp(-N (a - d))        for d < a < d + T
 
 Long cycles are met more often than they begin.  The reference lies (a - d)/T of a threshold below
-the signal.  Beside photoreceptor noise of standard deviation sigma and corner w, cycles end early,
-at the rate w z exp(-z^2/2) / sqrt(2 pi) at z sigma below the threshold (Kramers) [3, 4].
+the signal.  Beside photoreceptor noise both are one process: see initial_reference.
 
 Compiled in adv2e/kernel/leak.py.
 
@@ -40,8 +39,6 @@ References
 [2] Y. Hu, S.-C. Liu, T. Delbruck, "v2e: From Video Frames to Realistic DVS Events", CVPR Workshops
     2021, doi:10.1109/CVPRW53098.2021.00144 (0.1 Hz, jitter 10 %).
 [3] D. R. Cox, "Renewal theory", Methuen, 1962, chapter 5 (age of the cycle that is under way).
-[4] H. A. Kramers, "Brownian motion in a field of force and the diffusion model of chemical
-    reactions", Physica 7(4), 1940, doi:10.1016/S0031-8914(40)90098-2.
 """
 
 from __future__ import annotations
