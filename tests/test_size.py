@@ -25,8 +25,13 @@ LIMITS = {
     "compilation": 285,
     "config": 1300,
     "conversion": 1180,
+<<<<<<< HEAD
     "diagnosis": 6902,
     "effects": 1530,
+=======
+    "diagnosis": 6780,
+    "effects": 1531,
+>>>>>>> e9be1dd9 (Hot pixels may fire OFF, as those of cameras do)
     "exporting": 470,
     "files": 780,
     "formats": 5055,

@@ -42,6 +42,7 @@ class Circuit(NamedTuple):
     shot_fall: float  # share of them that is lost, a DN
     hot_rate: float  # events of the median hot pixel a us
     hot_spread: float  # standard deviation of the logarithm of that over the hot pixels
+    hot_off: float  # share of them whose events are OFF
     noise_rms: float  # photoreceptor noise
     noise_step: float
     causes: bool  # whether events know their causes

@@ -72,6 +72,8 @@ def take_noise(i, kind, light, circuit, state):
     """
     polarity = 1
     if kind == HOT:
+        if rng.uniforms(circuit.seed, rng.HOT_CHOICE, i, 0)[1] < circuit.hot_off:
+            polarity = -1
         _next_hot(i, circuit, state)
     else:
         u, v = rng.uniforms(circuit.seed, rng.SHOT_KIND, i, state[per_pixel.SHOT_DRAW, i])

@@ -188,6 +188,7 @@ def make_circuit(
             else 0.0
         ),
         hot_spread=math.log(10.0) * pixel.hot_pixels.spread if pixel.hot_pixels else 0.0,
+        hot_off=pixel.hot_pixels.off_fraction if pixel.hot_pixels else 0.0,
         noise_rms=noise.rms if noise else 0.0,
         noise_step=noise.step if noise else 0.1,
         causes=causes,

@@ -288,7 +288,7 @@ def test_any_number_survives_the_round_trip(rate, cutoff, seed):
 
 def test_to_dict_holds_plain_values():
     values = to_dict(full_config())
-    hot = {"fraction": 1e-05, "rate_hz": 1e22, "spread": 0.0}
+    hot = {"fraction": 1e-05, "rate_hz": 1e22, "spread": 0.0, "off_fraction": 0.0}
     assert values["pixel"]["hot_pixels"] == hot
     assert values["pixel"]["refractory"] is None
     assert values["readout"]["arbiter"] == {"event_ns": 100.0, "row_ns": 1000.0}

@@ -20,8 +20,8 @@ event, becomes rarer beside shot noise of rate lambda:
 
 Leak and photoreceptor noise are one process.  Shot noise beside both is added to it.
 
-Pixels differ: by their thresholds (normal), and some are hot, with ON rates of their own
-(log-normal).  Means and medians are over all of them.  In the bright, the few pixels with the
+Pixels differ: by their thresholds (normal), and some are hot, with rates of their own (log-normal),
+ON or OFF.  Means and medians are over all of them.  In the bright, the few pixels with the
 lowest thresholds have most of the events, and those whose thresholds are equal have more than
 others: pixels are taken down to 4.5 standard deviations, and closely where both are equal.
 
@@ -94,6 +94,8 @@ class NoisySources:
     """Median rate of the hot pixels."""
     hot_spread: float = 0.0
     """Standard deviation of log10 of it."""
+    hot_off: float = 0.0
+    """Share of them whose events are OFF."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,9 @@ class Rates:
     off_of: Array
     hot_fraction: float
     hot_hz: Array
-    """ON events that hot pixels have beside the others', at deviations of `_HOT`."""
+    """Events that hot pixels have beside the others', at deviations of `_HOT`."""
+    hot_off: float
+    """Share of the hot pixels whose events are OFF, else ON."""
 
     @property
     def leak(self) -> Array:
@@ -126,32 +130,34 @@ class Rates:
     def on_mean(self) -> Array:
         """ON events, mean over all pixels."""
         base: Array = (self.leak_of + self.on_of) @ self.weights
-        return base + self.hot_fraction * float(self.hot_hz @ _density(_HOT))
+        return base + self._hot(True) * float(self.hot_hz @ _density(_HOT))
 
     @property
     def off_mean(self) -> Array:
-        mean: Array = self.off_of @ self.weights
-        return mean
+        base: Array = self.off_of @ self.weights
+        return base + self._hot(False) * float(self.hot_hz @ _density(_HOT))
+
+    def _hot(self, on: bool) -> float:
+        """Return the share of all pixels that is hot and has such events."""
+        return self.hot_fraction * (1.0 - self.hot_off if on else self.hot_off)
 
     def at(self, lights: NDArray[np.int64]) -> Rates:
         parts = (self.leak_of[lights], self.on_of[lights], self.off_of[lights])
-        return Rates(self.weights, *parts, self.hot_fraction, self.hot_hz)
+        return Rates(self.weights, *parts, self.hot_fraction, self.hot_hz, self.hot_off)
 
     def share_having(self, number: int, seconds: Array, on: bool) -> Array:
         """Return the share of all pixels that have so many events or more in (n,) seconds."""
         time = seconds[:, None]
-        if not on:
-            off: Array = at_least(number, self.off_of * time) @ self.weights
-            return off
-        noise, leak = self.on_of * time, self.leak_of * time
+        noise, leak = (self.on_of, self.leak_of) if on else (self.off_of, 0.0 * self.leak_of)
+        usual = ((leak + noise) @ self.weights)[:, None]
+        noise, leak = noise * time, leak * time
         whole = np.floor(leak)  # leak is regular: one number of events, or one more
         more = leak - whole
         share = (1.0 - more) * at_least(number - whole, noise)
         share = (share + more * at_least(number - whole - 1.0, noise)) @ self.weights
-        if self.hot_fraction > 0.0:
-            usual = ((self.leak_of + self.on_of) @ self.weights)[:, None]
+        if self._hot(on) > 0.0:
             hot = at_least(number, (usual + self.hot_hz) * time) @ _density(_HOT)
-            share = (1.0 - self.hot_fraction) * share + self.hot_fraction * hot
+            share = (1.0 - self._hot(on)) * share + self._hot(on) * hot
         return np.asarray(share, dtype=np.float64)
 
 
@@ -175,7 +181,7 @@ def noise_rates(sources: NoisySources, light: Array) -> Rates:
     by_on, by_off = by_on + 0.5 * noise, by_off + 0.5 * noise
     by_leak, by_on, by_off = by_leak * busy, by_on * busy, by_off * busy
     hot = sources.hot_hz * 10.0 ** (sources.hot_spread * _HOT)
-    return Rates(weights, by_leak, by_on, by_off, sources.hot_fraction, hot)
+    return Rates(weights, by_leak, by_on, by_off, sources.hot_fraction, hot, sources.hot_off)
 
 
 def _kinds(sources: NoisySources) -> tuple[Array, Array, Array]:

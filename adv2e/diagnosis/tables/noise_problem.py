@@ -22,6 +22,7 @@ RMS = "pixel.photoreceptor_noise.rms"
 HOT_FRACTION = "pixel.hot_pixels.fraction"
 HOT_RATE = "pixel.hot_pixels.rate_hz"
 HOT_SPREAD = "pixel.hot_pixels.spread"
+HOT_OFF = "pixel.hot_pixels.off_fraction"
 CUTOFF = "pixel.low_pass.cutoff_hz"
 DARK_CUTOFF = "pixel.low_pass.dark_cutoff_hz"
 FOLLOWER = "pixel.source_follower.cutoff_hz"
@@ -148,6 +149,7 @@ class NoiseProblem(Problem):
             hot_fraction=values.get(HOT_FRACTION, self.hot_fraction),
             hot_hz=self.declared.value(values, HOT_RATE),
             hot_spread=self.declared.value(values, HOT_SPREAD),
+            hot_off=self.declared.value(values, HOT_OFF),
         )
         return noise_rates(sources, light / self.white)
 
@@ -192,12 +194,18 @@ class NoiseProblem(Problem):
         yield of_rate("shot_noise", SHOT)
         if not self.spread_shows:
             alone = of_rate("hot_pixels", HOT_RATE, 1.0 / self.hot_fraction)
-            yield replace(alone, extra=((HOT_FRACTION, self.hot_fraction),))
+            hot = replace(alone, extra=((HOT_FRACTION, self.hot_fraction),))
         else:
             spread = HOT_SPREAD, 0.05, 2.0, (0.7, 1.0, 1.0)
             rates = HOT_RATE, 1e-3, 1e3, (1.0, 0.1, 0.02)
             share = HOT_FRACTION, 1e-3, 0.5, (0.02, 0.1, 0.3)
-            yield _several("hot_pixels", [share, rates, spread])
+            hot = _several("hot_pixels", [share, rates, spread])
+        yield hot
+        dimmed = [kind.startswith("off") for kind in self._kinds]
+        bright = np.array(dimmed) & (self.level == self.level.max())
+        if HOT_OFF not in self.declared.written and rate[bright].any():
+            keys = *hot.parameters, FitParameter(HOT_OFF, 1e-3, 1.0)
+            yield replace(hot, parameters=keys, starts=tuple((*at, 0.3) for at in hot.starts))
         thresholds = self.declared.config.pixel.thresholds
         if self.declared.config.pixel.low_pass is None:
             return

@@ -155,7 +155,9 @@ class Selector:
         alternatives = [
             rival
             for rival in tried[len(after.effects) - 1]
-            if rival is not after and lower(rival, before, 1) and self._as_well(rival, after)
+            if rival.names != after.names  # or a few keys more of the same
+            and lower(rival, before, 1)
+            and self._as_well(rival, after)
         ]
         verdict: Verdict = "not_identifiable"
         if not alternatives:

@@ -120,6 +120,21 @@ def test_a_median_tells_hot_pixels():
     assert found.model["pixel"]["hot_pixels"]["fraction"] == 0.01
 
 
+def test_off_events_that_stay_in_bright_light_are_those_of_hot_pixels():
+    """Drawn pixel by pixel: one in 50 fires 20 times a second, three in ten of those OFF."""
+    rng = np.random.default_rng(8)
+    hot, off = rng.random(PIXELS) < 0.02, rng.random(PIXELS) < 0.3
+    counts = rng.poisson(20.0 * SECONDS * hot, (5, PIXELS))
+    on_hz, off_hz = ((counts * (off == of)).mean(axis=1) / SECONDS for of in (False, True))
+    median = np.zeros(5)
+    found = verdict_of(table(on_hz, off_hz, on_median=median))
+    assert [effect.name for effect in found.effects] == ["hot_pixels"]
+    parameters = found.effects[0].parameters
+    assert parameters["pixel.hot_pixels.off_fraction"] == pytest.approx(off[hot].mean(), rel=0.05)
+    mean = parameters["pixel.hot_pixels.fraction"] * parameters["pixel.hot_pixels.rate_hz"]
+    assert mean == pytest.approx(20.0 * hot.mean(), rel=0.05)
+
+
 @pytest.mark.thorough
 def test_noise_that_falls_as_one_over_light_is_unexplained():
     found = verdict_of(table(5.0 / LUX, 5.0 / LUX, on_median=5.0 / LUX))
