@@ -47,8 +47,10 @@ def without_coupling(config: Config) -> Config:
     return replace(config, readout=replace(config.readout, frame_coupling=None))
 
 
-def of_known_light(config: Config) -> Config:
+def of_known_light(config: Config, steps: int = 1) -> Config:
     """Return `config` for light that is known: nothing is between it and the pixels but its clock.
+
+    `steps` in which they follow it from one instant to the next.
 
     Raises
     ------
@@ -66,7 +68,7 @@ def of_known_light(config: Config) -> Config:
         clock_offset_us=clock.clock_offset_us,
         clock_drift_ppm=clock.clock_drift_ppm,
     )
-    return replace(without_coupling(config), frames=frames, sampling=Sampling(L=1))
+    return replace(without_coupling(config), frames=frames, sampling=Sampling(L=steps))
 
 
 def of_frames_again(config: Config, given: Config) -> Config:

@@ -95,7 +95,7 @@ def diagnose(
     began = time.perf_counter()
     given = declared
     if evidence.stimulus is not None:
-        declared = of_known_light(declared)
+        declared = of_known_light(declared, evidence.stimulus.steps)
     evidence = affordable(evidence, declared)
     with closing(Simulator(evidence, threads or default_threads(), progress)) as simulator:
 

@@ -13,6 +13,8 @@ light of which 255 is white; ``light`` is that of which 1 is white.  The column 
 holds for all pixels that are in no rectangle; one with them for the rectangle of its first column,
 first row, columns and rows.  Between two rows the light is a line; two rows of the same time are a
 leap.
+
+A table whose rectangles have few pixels each is a film (:mod:`adv2e.diagnosis.data.stimulus`).
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from numpy.typing import NDArray
 from adv2e.config.model import Sensor
 from adv2e.diagnosis.data.evidence import Evidence, check_events, covered
 from adv2e.diagnosis.data.splits import Stream
-from adv2e.diagnosis.data.stimulus import LEAP_NS, Seen, Stimulus, refined
+from adv2e.diagnosis.data.stimulus import FILM_STEPS, LEAP_NS, Seen, Stimulus, of_film, refined
 from adv2e.diagnosis.tables.table import Table, read_table
 from adv2e.effects.frames.brightness import BRIGHTEST
 from adv2e.errors import DataError
@@ -41,6 +43,8 @@ _TIMES_NS = {"time_s": 1e9, "time_ms": 1e6, "time_us": 1e3}
 _LIGHTS_DN = {"light_dn": 1.0, "light": 255.0}
 _WHITE_DN = 255.0
 _REST = -1
+_ALIKE = 8
+"""Pixels of a column of light from which on, on average, it is that of a lamp and not of a film."""
 
 
 def read_known_light(
@@ -119,8 +123,10 @@ def read_stimulus(path: str | Path, size: Size) -> tuple[Stimulus, Rectangle]:
         raise table.wrong(row, names[column], most)
     region, part = _regions(table.name, names, size)
     course = Stimulus(shown(path), times_ns, light, region)
-    every = refined(times_ns, light)
-    return Stimulus(course.name, every, course.at(every), region), part
+    is_film = part.width * part.height < _ALIKE * len(names)
+    every, steps = (of_film, FILM_STEPS) if is_film else (refined, 1)
+    at_ns = every(times_ns, light)
+    return Stimulus(course.name, at_ns, course.at(at_ns), region, steps), part
 
 
 def _columns(table: Table, known: dict[str, float]) -> list[str]:

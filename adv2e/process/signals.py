@@ -67,6 +67,7 @@ class _Stop:
 def stopping_on_signals() -> Iterator[None]:
     """Install the handlers of :func:`stop_on_signals` for the body only."""
     caught = stop_on_signals()
+    say_at_end(str)
     try:
         yield
     finally:
@@ -167,17 +168,17 @@ def _usual() -> dict[int, Callable[[int, FrameType | None], object] | signal.Han
     return {getattr(signal, name): what for name, what in names.items() if hasattr(signal, name)}
 
 
-_also = [""]
+_also: list[Callable[[], str]] = [str]
 
 
-def say_at_end(text: str) -> None:
-    """Have the last words go on with a text, from now on."""
-    _also[0] = text
+def say_at_end(more: Callable[[], str]) -> None:
+    """Have the last words go on with what a function returns then, which is to take no lock."""
+    _also[0] = more
 
 
 def last_words(ending: BaseException) -> str:
     ended = f"stopped by {ending}" if isinstance(ending, Terminated) else "interrupted"
-    return ended + _also[0]
+    return ended + _also[0]()
 
 
 def _say_at_once(text: str) -> None:

@@ -118,34 +118,35 @@ def so_far(
         place = older.with_name(f"{older.name}.unfinished")
         check_folder(place)
 
+    def last_words() -> str:
+        page = place / NAMES[0]
+        return f"; what was known by then: {shown(page)}" if page.exists() else ""
+
     def write(diagnosis: Diagnosis) -> None:
         nonlocal written
+        signals.say_at_end(last_words)
         try:
             write_reports(diagnosis, place)
         except OutputError as error:
             warnings.warn(f"what is known so far cannot be kept: {error}", Adv2eWarning, 2)
             return
         written = True
-        signals.say_at_end(f"; what was known by then: {shown(place / NAMES[0])}")
+
+    def ended() -> None:
+        signals.say_at_end(str)
+        if written and is_unfinished(place):
+            with suppress(OSError):  # something else may lie there by now
+                for name in NAMES:
+                    (place / name).unlink()
+                place.rmdir()
 
     try:
         yield write
     except BaseException as error:
-        if not isinstance(error, Exception):
-            written = False
+        if isinstance(error, Exception):
+            ended()
         raise
-    finally:
-        if written:
-            signals.say_at_end("")
-            _remove_unfinished(place)
-
-
-def _remove_unfinished(folder: Path) -> None:
-    if is_unfinished(folder):
-        with suppress(OSError):  # something else may lie there by now
-            for name in NAMES:
-                (folder / name).unlink()
-            folder.rmdir()
+    ended()
 
 
 # ---- ``report.json``: what a diagnosis found, for programs.

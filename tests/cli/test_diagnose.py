@@ -27,6 +27,7 @@ from adv2e.diagnosis.outcome import verdict
 from adv2e.diagnosis.selection import reference, shortlist
 from adv2e.formats.writing import open_sink
 from adv2e.geometry import Rectangle
+from adv2e.process.signals import last_words, stopping_on_signals
 from adv2e.reports import files, summary
 from adv2e.reports.files import write_reports
 
@@ -195,6 +196,9 @@ def test_what_is_known_is_kept_at_each_stage_and_by_an_interruption(
     ends = f"adv2e: interrupted; what was known by then: {beside / 'report.html'}"
     assert outcome.err.splitlines()[-1] == ends
     assert (out / "report.json").read_bytes() == whole
+    with pytest.raises(KeyboardInterrupt), stopping_on_signals():
+        assert last_words(KeyboardInterrupt()) == "interrupted"  # of another run
+        raise KeyboardInterrupt
     left = json.loads((beside / "report.json").read_text("utf-8"))
     assert (left, left["complete"]) == (seen[-1], False)
     assert left["effects"] == added["effects"]

@@ -4,6 +4,9 @@ Every pixel of a region sees the same light.  It is a line between two instants;
 of them are 0.1 us apart, which is less than a stamp tells.  The pixels' own simulation takes the
 logarithm of the light for a line, so that instants are put between two that are far apart: what is
 left is at most 5e-5 ln.
+
+In a film hardly two pixels see the same, and some pixel changes much at any time.  So its rows are
+what frames are elsewhere: the line between two is followed in ten steps, as those of frames are.
 """
 
 from __future__ import annotations
@@ -32,8 +35,10 @@ _OF_A_STEP = 0.25
 """Time between instants that are looked at, where leaps are near, as a share of that between two"""
 _MOST = 4000
 """Times between instants that are looked at."""
-_LEAST_LN, _QUICK_NS, _APART_US = 0.05, 100_000, 200
-"""A leap: by at least so much, within so long, and not so soon after another."""
+_LEAST_LN, _APART_US = 0.05, 200
+"""A leap: by at least so much, and not so soon after another."""
+FILM_STEPS, _FILM_NS = 10, 5_000_000
+"""Of a film: steps from one instant to the next, and how far apart these are at most."""
 
 
 @dataclass(frozen=True)
@@ -50,12 +55,15 @@ class Stimulus:
         Light at them [DN].
     region : (rows, columns)
         Which of the regions each pixel is in.
+    steps : int
+        In which pixels follow the line from one instant to the next.
     """
 
     name: str
     times_ns: NDArray[np.int64]
     light: NDArray[np.float64]
     region: NDArray[np.intp]
+    steps: int = 1
 
     def at(self, times_ns: NDArray[Any]) -> NDArray[np.float64]:
         """Return the light at some times, (times, regions); of a leap, that before it."""
@@ -111,6 +119,18 @@ def refined(times_ns: NDArray[np.int64], light: NDArray[np.float64]) -> NDArray[
     return np.unique(np.array(found, np.int64))
 
 
+def of_film(times_ns: NDArray[np.int64], light: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the instants of a film, and more between those that are far apart as it changes.
+
+    Arguments as of :func:`refined`.
+    """
+    changes = np.any(np.diff(light, axis=0) != 0.0, axis=1)
+    pieces = np.where(changes, -(-np.diff(times_ns) // _FILM_NS), 1)
+    ends = zip(times_ns[:-1], times_ns[1:], pieces, strict=True)
+    found = [a + np.rint(np.linspace(0, b - a, count + 1)).astype(np.int64) for a, b, count in ends]
+    return np.unique(np.concatenate(found))
+
+
 def _between(
     start_ns: int, stop_ns: int, first: NDArray[np.float64], last: NDArray[np.float64]
 ) -> list[int]:
@@ -138,7 +158,7 @@ def _between(
 
 def _leaps_us(times_ns: NDArray[np.int64], course: NDArray[np.float64]) -> NDArray[np.int64]:
     change = np.abs(np.diff(np.log(np.maximum(course, _DARK_DN))))
-    quick = (change > _LEAST_LN) & (np.diff(times_ns) <= _QUICK_NS)
+    quick = (change > _LEAST_LN) & (np.diff(times_ns) <= LEAP_NS)
     found: list[int] = []
     for t_us in (times_ns[:-1][quick] // 1000).tolist():
         if not found or t_us - found[-1] >= _APART_US:
@@ -158,15 +178,18 @@ class Leaps:
 
         -1: there was none.
         """
-        since = np.full(len(stream), -1, np.int64)
+        every = np.concatenate(self.times_us)
+        if not len(every):
+            return np.full(len(stream), -1, np.int64)
+        # one region after the other, each as long as all leaps and a moment before them
+        first, length = every.min() - 1, every.max() - every.min() + 2
+        counts = [len(leaps) for leaps in self.times_us]
+        place = np.repeat(np.arange(len(counts)), counts) * length + every - first
         of_region = self.region[stream.pixel]
-        for number, leaps in enumerate(self.times_us):
-            which = np.flatnonzero(of_region == number) if len(self.times_us) > 1 else slice(None)
-            before = np.searchsorted(leaps, stream.t[which], "right") - 1
-            if len(leaps):
-                after = stream.t[which] - leaps[np.maximum(before, 0)]
-                since[which] = np.where(before >= 0, after, -1)
-        return since
+        begin = np.r_[0, np.cumsum(counts)][of_region]
+        seen = of_region * length + np.clip(stream.t - first, 0, length - 1)
+        before = np.searchsorted(place, seen, "right") - 1
+        return np.where(before >= begin, stream.t - every[np.maximum(before, 0)], -1)
 
 
 class Seen(Sequence[NDArray[Any]]):

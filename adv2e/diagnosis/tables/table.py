@@ -38,8 +38,10 @@ from __future__ import annotations
 import csv
 import math
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -78,8 +80,12 @@ class Table:
         return len(self.rows)
 
     def texts(self, column: str) -> list[str]:
-        at = self.columns.index(column)
+        at = self._places[column]
         return [row[at] for row in self.rows]
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {column: at for at, column in enumerate(self.columns)}
 
     def numbers(
         self,
@@ -99,7 +105,7 @@ class Table:
         """
         values = np.full(len(self), np.nan)
         or_empty = "" if required else ", or empty"
-        for k, text in enumerate(self.texts(column) if column in self.columns else []):
+        for k, text in enumerate(self.texts(column) if column in self._places else []):
             if not text and not required:
                 continue
             try:
@@ -189,10 +195,10 @@ def parse_table(text: str, name: str) -> Table:
         raise DataError(
             f"{name}:{header_line}: the header has no comma, semicolon or tab between its columns"
         )
-    for column in header:
+    for column, number in Counter(header).items():
         if not column:
             raise DataError(f"{name}:{header_line}: the header has a column without a name")
-        if header.count(column) > 1:
+        if number > 1:
             raise DataError(f"{name}:{header_line}: the header has {column!r} twice")
     if len(numbered) == 1:
         raise DataError(f"{name}:{header_line}: there are no rows below the header")

@@ -7,7 +7,15 @@ from adv2e import simulate
 from adv2e.config import load_config
 from adv2e.diagnosis.configurations import of_frames_again, of_known_light, with_keys
 from adv2e.diagnosis.data.splits import Stream
-from adv2e.diagnosis.data.stimulus import LEAP_NS, Seen, Stimulus, joined, refined
+from adv2e.diagnosis.data.stimulus import (
+    FILM_STEPS,
+    LEAP_NS,
+    Leaps,
+    Seen,
+    Stimulus,
+    joined,
+    refined,
+)
 from adv2e.diagnosis.known_light import read_known_light, read_stimulus
 from adv2e.diagnosis.simulation.affordable import affordable
 from adv2e.diagnosis.simulation.simulator import Simulator
@@ -224,3 +232,70 @@ def test_time_since_a_leap_is_that_of_the_last_one():
     t = np.array([50_000, 100_000, 299_999, 300_010])
     stream = Stream(t, np.zeros(4, np.int32), np.ones(4, np.int8), 6, 4)
     assert course.leaps.since(stream).tolist() == [-1, 0, 199_999, 10]
+
+
+def film(rows, size=SIZE):
+    """Return a table of a film, each pixel a rectangle of its own, from (time, (rows, columns))."""
+    names = [f"light_dn {x} {y} 1 1" for y in range(size.height) for x in range(size.width)]
+    lines = [",".join(["time_s", *names])]
+    lines += [",".join([f"{t:.9f}", *(f"{dn:.6f}" for dn in light.ravel())]) for t, light in rows]
+    return "\n".join([*lines, ""])
+
+
+def edge(t):
+    """Return a bright edge that moves over the dark, (rows, columns) [DN]."""
+    x, y = np.meshgrid(np.arange(SIZE.width), np.arange(SIZE.height))
+    return 1.0 + 200.0 / (1.0 + np.exp(-3.0 * (20.0 * t - x - 0.3 * y)))
+
+
+def test_a_film_is_followed_from_row_to_row(table, recording):
+    times = np.linspace(0.0, 0.5, 251)
+    path = table(film([(t, edge(t)) for t in times]))
+    evidence = read_known_light(recording(0, 499_999), path)
+    assert evidence.stimulus.steps == FILM_STEPS
+    assert np.array_equal(evidence.stimulus.times_ns, np.rint(times * 1e9))
+    made = Simulator(evidence, 1).stream(of_known_light(NOISELESS, FILM_STEPS), 0)
+    # the line from row to row, in steps that are far finer
+    fine_s = np.linspace(0.0, 0.5, 250 * 200 + 1)
+    rows = np.stack([edge(t) for t in times])
+    k = np.minimum((fine_s / 0.002).astype(int), 249)
+    share = (fine_s / 0.002 - k)[:, None, None]
+    frames = ((1.0 - share) * rows[k] + share * rows[k + 1]).astype(np.float32)
+    config = with_keys(NOISELESS, {"sampling.L": 1, "frames.full_scale": 255.0})
+    truth = np.concatenate(list(simulate(list(frames), fine_s, config)))
+    assert len(made) == len(truth) > 300
+    order = np.lexsort((made.t, made.pixel))
+    by_pixel = np.lexsort((truth["t"], truth["y"] * SIZE.width + truth["x"]))
+    assert np.abs(made.t[order] - truth["t"][by_pixel]).max() <= 3
+    assert np.array_equal(made.on[order], truth["p"][by_pixel])
+
+
+def test_rows_of_a_film_that_are_far_apart_have_more_between_them_as_it_changes(table):
+    dark, lit = edge(0.0), edge(0.2)
+    rows = [(0.0, dark), (0.101, dark), (0.101, lit), (0.4, lit), (0.4121, dark)]
+    found, _ = read_stimulus(table(film(rows)), SIZE)
+    assert found.times_ns.tolist() == [
+        0, 101_000_000, 101_000_100, 400_000_000, 404_033_333, 408_066_667, 412_100_000,
+    ]  # fmt: skip
+    assert found.at([406_050_000])[0] == pytest.approx(0.5 * (dark + lit).ravel())
+    assert {tuple(one.tolist()) for one in found.leaps.times_us} == {(101_000,)}
+
+
+def test_a_lamp_over_many_pixels_is_no_film(table):
+    found, _ = read_stimulus(table("time_s,light_dn,light_dn 0 0 2 2\n0,20,1\n1,60,200\n"), SIZE)
+    assert found.steps == 1
+    assert len(found.times_ns) > 100
+
+
+def test_time_since_a_leap_is_that_of_its_own_region():
+    random = np.random.default_rng(3)
+    regions = [np.sort(random.integers(-500, 500, n)) for n in (0, 3, 40, 1, 0, 7)]
+    region = random.integers(0, 6, 24)
+    t = np.sort(random.integers(-700, 900, 4000))
+    stream = Stream(t, random.integers(0, 24, 4000), np.ones(4000, np.int8), 6, 4)
+    expected = [
+        min((at - leap for leap in regions[region[pixel]] if leap <= at), default=-1)
+        for at, pixel in zip(t.tolist(), stream.pixel, strict=True)
+    ]
+    assert Leaps(tuple(regions), region).since(stream).tolist() == expected
+    assert set(Leaps((regions[0],) * 6, region).since(stream).tolist()) == {-1}
