@@ -10,6 +10,7 @@ pytestmark = pytest.mark.thorough
 
 HIDDEN = {
     "slew limit": {"slew_limit": {"per_s": 15.0}},
+    "high-pass": {"high_pass": {"cutoff_hz": 8.0}},
     "overshoot": {"reset_overshoot": {"fraction": 0.3}},
     "undershoot, no dead time": {"reset_overshoot": {"fraction": -0.3}, "refractory": None},
     "drift": {"thresholds": {"drift_per_s": 2.0}},

@@ -23,15 +23,15 @@ LIMITS = {
     "cli": 1290,
     "comparison": 1165,
     "compilation": 285,
-    "config": 1300,
-    "conversion": 1180,
+    "config": 1305,
+    "conversion": 1190,
     "diagnosis": 6930,
-    "effects": 1531,
+    "effects": 1548,
     "exporting": 470,
     "files": 780,
     "formats": 5055,
     "inspection": 260,
-    "kernel": 5880,
+    "kernel": 5940,
     "light": 865,
     "motion": 350,
     "pixel": 575,
@@ -44,7 +44,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 314
+FILES = 315
 """Most modules of all packages together."""
 
 _SLACK = 60

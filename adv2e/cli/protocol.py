@@ -26,7 +26,7 @@ Record the LED (1 minute), in one recording of about 25 s
           in turn, 50 to 150 ms apart              leap: thresholds, ON and OFF, and mismatch
   leaps   2 s by a factor of 10, 200 ms apart      dead time (refractory), reset_overshoot, readout
   ramps   up and down by a factor of 10, 3 s       thresholds without any lag; threshold_drift, if
-          each way, at the beginning and end       they are others at the end
+          each way, at the beginning and end       they are others at the end; high_pass
 
 Record a still scene (1 minute), 10 s: the lens on, grey patches, nothing moves, constant light
                                                    noise at many lights at once, hot_pixels, leak

@@ -11,6 +11,7 @@ from adv2e.effects.frames.encoding import check_encoding
 from adv2e.effects.frames.flicker import Flicker
 from adv2e.effects.pixel.dark_current import DarkCurrent
 from adv2e.effects.pixel.dead_pixels import DeadPixels
+from adv2e.effects.pixel.high_pass import HighPass
 from adv2e.effects.pixel.hot_pixels import HotPixels
 from adv2e.effects.pixel.initial_reference import REFERENCES, RUNNING
 from adv2e.effects.pixel.leak import Leak
@@ -207,6 +208,7 @@ class Pixel(Section):
     low_pass: LowPass | None = subsection(LowPass, meaning="first pole, follows the light")
     slew_limit: SlewLimit | None = subsection(None, meaning="slew rate of the first pole")
     source_follower: SourceFollower | None = subsection(None, meaning="second pole")
+    high_pass: HighPass | None = subsection(None, meaning="high-pass ahead of the comparator")
     thresholds: Thresholds = subsection(Thresholds, meaning="contrast thresholds")
     refractory: Refractory | None = subsection(Refractory, meaning="dead time")
     reset_overshoot: ResetOvershoot | None = subsection(None, meaning="reference after an event")

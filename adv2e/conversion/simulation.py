@@ -20,7 +20,7 @@ from adv2e.effects.frames.brightness import bounded, check_floats
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Frames, Hooks, LightFrame
 from adv2e.effects.reorder_buffer import InOrder
-from adv2e.errors import DataError, UsageError, warn
+from adv2e.errors import ConfigError, DataError, UsageError, warn
 from adv2e.events import Events, empty_events
 from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.intervals import Intervals
@@ -118,7 +118,7 @@ def simulate(
     _check_numbers(frames, times)
     hooks = active_hooks(config, effects)
     if causes:
-        check_causes(hooks)
+        _check_causes(hooks, config)
     coming = iter(frames)
     first = next(coming, None)
     if first is None:
@@ -273,7 +273,7 @@ def events_from_light(
     """
     hooks = active_hooks(config) if hooks is None else hooks
     if causes:
-        check_causes(hooks)
+        _check_causes(hooks, config)
     if any(overrides(hook, "events") for hook in hooks):
         complete = None
     frames = bounded(begin(hooks, iter(light), config.seed), table)
@@ -346,3 +346,13 @@ def _pixel_events(
             for hook in hooks:
                 hook.passed(part.times_ns[-1] * 1e-9)
         yield order.rest()
+
+
+def _check_causes(hooks: Sequence[Hooks], config: Config) -> None:
+    """Raise ConfigError where the causes of events cannot be told."""
+    check_causes(hooks)
+    if config.pixel.high_pass and config.pixel.photoreceptor_noise:
+        raise ConfigError(
+            "causes: pixel.photoreceptor_noise is not told from the light behind pixel.high_pass:"
+            " switch one of both off"
+        )

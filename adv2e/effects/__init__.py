@@ -70,6 +70,7 @@ EFFECTS = (
     Effect("pixel", "low_pass"),
     Effect("pixel", "slew_limit"),
     Effect("pixel", "source_follower"),
+    Effect("pixel", "high_pass"),
     Effect("pixel", "initial_reference", ("pixel.initial_reference",)),
     Effect("pixel", "thresholds", told_as=("threshold_mismatch",)),
     Effect("pixel", "threshold_drift", ("pixel.thresholds.drift_per_s",)),

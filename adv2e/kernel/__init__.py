@@ -8,8 +8,8 @@ Three solvers, each a strip of pixels at a time through all intervals:
 ``unfiltered``      no filter, leak or noise of the photoreceptor: the next frame shows which
                     pixels may fire, and these go through the instants before it
 ``stepped``         everything else, in steps of time: the K-step forms, no low-pass but leak,
-                    noise, drift or a second pole, the last interval as printed, slew limit, and
-                    what acts on the pixels from outside
+                    noise, drift or a second pole, the last interval as printed, slew limit,
+                    high-pass, and what acts on the pixels from outside
 
 and what they share:
 

@@ -57,7 +57,7 @@ def new_memory() -> ExactMemory:
 
 def covers(circuit: Circuit) -> bool:
     """Tell whether this module advances the circuit; if not, it is solved in steps of time."""
-    plain = circuit.slew == 0.0 and not circuit.printed
+    plain = max(circuit.slew, circuit.high) == 0.0 and not circuit.printed
     return circuit.update == EXACT and circuit.filtered and plain
 
 

@@ -30,6 +30,7 @@ class Circuit(NamedTuple):
     per_dn: float  # 2 pi (cutoff - dark_cutoff) / 255
     slew: float  # fastest change of the first pole a us; 0: no limit
     follower: float  # 2 pi cutoff of the second pole; 0: none
+    high: float  # 2 pi cutoff of the high-pass behind both; 0: none
     knee: float  # log intensity at the knee; below it, light = slope x
     slope: float  # d light / d x below the knee; 0: no knee
     floor: float  # least light where there is no knee

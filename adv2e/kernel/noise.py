@@ -109,17 +109,33 @@ def fill_first_hot_times(seed, fraction, rate, spread, start, times):
 
 
 @kernel
-def stationary_noise(i, draw, share, circuit):
-    """Draw the noise of pixel i before and behind the second pole, as it is at any moment.
+def stationary_noise(i, draw, corner, circuit):
+    """Draw noise of pixel i before and behind the second pole, and what the high-pass subtracts.
 
-    Both are jointly stationary: behind a pole of corner f2, noise of corner f1 keeps the share
-    f2/(f1 + f2) of its variance, and the covariance of both is that same share.
+    All are as they are at any moment, together.  Behind a pole of corner f2, noise of corner f1
+    keeps the share f2/(f1 + f2) of its variance, and the covariance of both is that same share.
+    Of processes that follow one another, moments are those at which none changes in the mean:
+    behind a pole of corner w, d<pq>/dt = w <p(input)> - w <pq> - ...
     """
-    noise = seen = circuit.noise_rms * rng.normal(circuit.seed, rng.PHOTORECEPTOR, i, draw)
-    if circuit.follower > 0.0:
-        own = circuit.noise_rms * math.sqrt(share * (1.0 - share))
-        seen = share * noise + own * rng.normal(circuit.seed, rng.PHOTORECEPTOR_BEHIND, i, draw)
-    return noise, seen
+    rms, second, high = circuit.noise_rms, circuit.follower, circuit.high
+    share, spare, slow = 1.0, 0.0, 0.0
+    noise = seen = rms * rng.normal(circuit.seed, rng.PHOTORECEPTOR, i, draw)
+    if second > 0.0:
+        share = second / (second + corner)
+        own = rms * math.sqrt(share * (1.0 - share))
+        spare = own * rng.normal(circuit.seed, rng.PHOTORECEPTOR_BEHIND, i, draw)
+        seen = share * noise + spare
+    if high > 0.0:
+        # covariances with noise and seen, its part that goes with spare, and what is left [rms^2]
+        by_noise = with_seen = high / (high + corner) * share
+        own, by_spare = share * (1.0 - share), 0.0
+        if second > 0.0:
+            with_seen = (second * by_noise + high * share) / (second + high)
+            by_spare = (with_seen - by_noise * share) / own if own > 0.0 else 0.0
+        left = math.sqrt(max(with_seen - by_noise**2 - by_spare**2 * own, 0.0))
+        new = rms * left * rng.normal(circuit.seed, rng.PHOTORECEPTOR_SLOW, i, draw)
+        slow = by_noise * noise + by_spare * spare + new
+    return noise, seen, slow
 
 
 @kernel
@@ -127,7 +143,8 @@ def fill_first_noise(lo, hi, circuit, light, state):
     """Draw the noise of the pixels lo..hi in `light` [DN]; their references are the signal."""
     for i in range(lo, hi):
         corner = circuit.dark + circuit.per_dn * light[i]
-        share = circuit.follower / (circuit.follower + corner)
-        noise, seen = stationary_noise(i, 0, share, circuit)
+        noise, seen, slow = stationary_noise(i, 0, corner, circuit)
         state[per_pixel.NOISE, i], state[per_pixel.SEEN, i] = noise, seen
-        state[per_pixel.REFERENCE, i] += seen
+        state[per_pixel.REFERENCE, i] += seen - slow
+        if circuit.high > 0.0:
+            state[per_pixel.SLOW, i] = slow

@@ -8,7 +8,7 @@ from adv2e.kernel import rng
 NEVER = 1e300
 """Time of an event that does not happen [us]."""
 
-ROWS = 22
+ROWS = 23
 
 (
     X,  # log intensity at the last frame
@@ -24,10 +24,11 @@ ROWS = 22
     LEAK_FACTOR,  # leak speed of this cycle
     LEAK_DRAW,
     NOISE,  # of the photoreceptor
-    SEEN,  # the same as the comparator sees it
+    SEEN,  # the same behind the second pole, if there is one
     NOISE_DRAW,
     FIRST,  # signal behind the first pole, as the stepped solver keeps it
     SECOND,  # the same behind the second pole
+    SLOW,  # what the high-pass behind that subtracts
     BEYOND,  # where the reference goes beyond the signal at the end of the dead time
     # for the causes of events alone: see adv2e.kernel.comparator
     RESET,  # the reference as it was at its reset, NEVER in the dead time

@@ -20,7 +20,7 @@ from adv2e.kernel.comparator import TIE, fire, with_room
 from adv2e.kernel.inputs import EXACT, Circuit
 from adv2e.kernel.stepped import events, rows
 from adv2e.kernel.stepped.driver import ROOM, TimeStep, load_x
-from adv2e.kernel.stepped.signal import log_of_light
+from adv2e.kernel.stepped.signal import NO_POLE, log_of_light
 from adv2e.kernel.work_queue import claim
 
 
@@ -44,7 +44,7 @@ def new_memory() -> UnfilteredMemory:
 def covers(circuit: Circuit) -> bool:
     """Tell whether this module advances the circuit, where nothing is added to it at steps."""
     plain = circuit.update == EXACT and not circuit.printed and not circuit.filtered
-    poles = max(circuit.slew, circuit.follower, circuit.noise_rms)
+    poles = max(circuit.slew, circuit.follower, circuit.high, circuit.noise_rms)
     return plain and max(poles, circuit.leak, circuit.photo_leak) == 0.0
 
 
@@ -148,7 +148,7 @@ def _go_through(lo, m, f, end, schedule, circuit, injected, state, memory, buffe
             for j in range(m):
                 few[rows.SIGNAL1 + j] = strip[rows.XB + pixels[j]]
         length = starts[s + 1] - starts[s]
-        step = TimeStep(0, 0, starts[s], length, 1.0, 0.5, (0.0, 0.0, 0.0, 0.0, 0.0))
+        step = TimeStep(0, 0, starts[s], length, 1.0, 0.5, NO_POLE, NO_POLE)
         c = np.int64(0)
         count = _may_fire(m, rows.SIGNAL1, starts[s] + length, few, memory.hits)
         while c < count:

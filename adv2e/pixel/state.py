@@ -89,6 +89,9 @@ def initial_state(
         fill(fill_first_noise, circuit, lit, state)
     if noise and stepping is not None:
         state[per_pixel.SECOND] += state[per_pixel.SEEN]
+    if circuit.high > 0:  # it rests on the signal
+        state[per_pixel.SLOW] += state[per_pixel.FIRST]
+        state[per_pixel.REFERENCE] -= state[per_pixel.FIRST]
     reset = state[per_pixel.REFERENCE].copy() if circuit.causes else None
     if running and not noise and (circuit.leak > 0 or circuit.photo_leak > 0):
         fill(fill_running, circuit, start, lit, on_level, state)
@@ -172,6 +175,7 @@ def make_circuit(
         per_dn=corner * (white - dark) / 255.0,
         slew=pixel.slew_limit.per_s * _PER_US if pixel.slew_limit else 0.0,
         follower=corner * follower.cutoff_hz if follower else 0.0,
+        high=corner * pixel.high_pass.cutoff_hz if pixel.high_pass else 0.0,
         knee=math.log(knee_dn) if knee_dn > 0 else -_NO_KNEE,
         slope=knee_dn / math.log(knee_dn) if knee_dn > 0 else 0.0,
         floor=pixel.log_response.floor,

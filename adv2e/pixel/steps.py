@@ -9,10 +9,10 @@ bends, at the frames; where the light passes the knee of the log map within a st
 there, which leaves some 0.1 us.  Where a slew limit sets in or ends, its curvature leaps: an event
 of that step may be off by h (w h)/13 (1.15 us were found at w h = 0.15), so that steps are shorter
 with it, for 0.3 us.  Leak is a cubic, noise and courses are lines within each step: they are as
-good as ``step_us`` resolves them.  Behind a second pole events may come where the signal creeps,
-and what the signal lacks is many times that in time: steps are half as long (at w h = 1/2, one
-event of 50 was 5 us off; 0.8 us at 1/4).  Against dense solutions of the circuit all times agree
-within 1 us, most within 0.05 us.
+good as ``step_us`` resolves them.  Behind a second pole or a high-pass events may come where the
+signal creeps, and what it lacks is many times that in time: steps are half as long (at w h = 1/2,
+one event of 50 was 5 us off; 0.8 us at 1/4).  Against dense solutions of the circuit all times
+agree within 1 us, most within 0.05 us.
 
 Photoreceptor noise is drawn at each step here, so in every pixel at most
 ``photoreceptor_noise.step`` of the correlation time at white apart.
@@ -94,12 +94,13 @@ def steps_of(
     """
     solved, added = coarseness
     # without a pole the signal is a line, and so is a leak that does not follow the light
-    curved = circuit.filtered or max(circuit.follower, circuit.slew, circuit.photo_leak) > 0.0
+    creeps = max(circuit.follower, circuit.high)
+    curved = circuit.filtered or max(creeps, circuit.slew, circuit.photo_leak) > 0.0
     if not curved and step_us == math.inf:
         return 1
     limit = min(solved * LONGEST_US, added * step_us)
     fastest = fastest_corner(circuit, max(brightest, _WHITE))
-    share = min(_SHARE, solved * _SHARE_OF_TWO) if circuit.follower > 0.0 else _SHARE
+    share = min(_SHARE, solved * _SHARE_OF_TWO) if creeps > 0.0 else _SHARE
     if circuit.filtered:
         limit = min(limit, share / fastest if fastest > 0 else limit)
         if circuit.noise_rms > 0.0:
@@ -107,8 +108,8 @@ def steps_of(
             limit = min(limit, drawn / fastest if fastest > 0 else limit)
     if circuit.slew > 0.0 and fastest > 0.0:
         limit = min(limit, solved * math.sqrt(_BEND_US / fastest))
-    if circuit.follower > 0.0:
-        limit = min(limit, share / circuit.follower)
+    if creeps > 0.0:
+        limit = min(limit, share / creeps)
     few = min(_FEWEST, math.ceil(length_us / _SHORT_US))
     # where the light overshoots, up to 4 us were found
     return max(1, few, math.ceil(length_us / limit)) * (2 if circuit.printed else 1)

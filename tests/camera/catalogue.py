@@ -46,6 +46,7 @@ _LIBRARY: dict[str, dict[str, tuple[Any, Any, Any]]] = {
     "dark_current": {"pixel.dark_current.dn": (1.0, 3.0, 10.0)},
     "source_follower": {"pixel.source_follower.cutoff_hz": (150.0, 60.0, 25.0)},
     "slew_limit": {"pixel.slew_limit.per_s": (80.0, 40.0, 20.0)},
+    "high_pass": {"pixel.high_pass.cutoff_hz": (0.3, 1.0, 4.0)},
     "refractory": {"pixel.refractory.period_us": (1500.0, 4000.0, 10000.0)},
     "reset_overshoot": {"pixel.reset_overshoot.fraction": (0.05, 0.15, 0.30)},
     "leak": {"pixel.leak.rate_hz": (0.5, 2.0, 6.0)},

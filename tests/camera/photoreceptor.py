@@ -59,7 +59,8 @@ class Photoreceptor:
 
     .. math:: n_1 = (1 - g)\,n_0 + \sigma\sqrt{1 - (1 - g)^2}\;\xi,
 
-    g being the pole's gain in a step.  Second pole: dz/dt = w_s (y + n - z).
+    g being the pole's gain in a step.  Second pole: dz/dt = w_s (y + n - z).  High-pass: of either,
+    what follows it as another such pole is subtracted.
 
     Sources: Lichtsteiner, Posch, Delbruck 2008 (poles); Graca, Delbruck, "Unraveling the paradox of
     intensity-dependent DVS pixel noise", 2021 (noise limited by the pole).
@@ -89,18 +90,23 @@ class Photoreceptor:
         self._move = np.empty_like(x)
         self._input = x if self._noise is None else x + self._noise
         self._z = self._input.copy()
+        high = find(settings, "pixel.high_pass.cutoff_hz", None)
+        self._forget = None if high is None else gain_of(2 * np.pi * high, step_s)
+        self._slow = np.zeros_like(x)  # above the drive at the start, where the pixel rests
+        self._rest = x.copy()
 
     @property
     def signal(self) -> Array:
         """Present output, (pixels,)."""
-        return self._z if self._follow is not None else self._input
+        passed = self._z if self._follow is not None else self._input
+        return passed if self._forget is None else passed - self._slow
 
     def advance(self, x: Array, gain: Array | None) -> Array:
         """Go on by a step with the drive `x` and the first pole's `gain`; return the signal.
 
         The array returned is a new one if it is not the one returned last.
         """
-        before = self._input
+        before, passed = self._input, self._z if self._follow is not None else self._input
         self._advance_pole(x, gain)
         if self._noise is None:
             self._input = self._y.copy()
@@ -114,6 +120,9 @@ class Photoreceptor:
             middle *= self._follow
             middle += self._z
             self._z = middle
+        if self._forget is not None:
+            after = self._z if self._follow is not None else self._input
+            self._slow += self._forget * (0.5 * (passed + after) - self._rest - self._slow)
         return self.signal
 
     def _advance_pole(self, x: Array, gain: Array | None) -> None:

@@ -30,6 +30,7 @@ _NAMES = {
     "pixel.low_pass": ("cutoff_hz", "dark_cutoff_hz", "update"),
     "pixel.dark_current": ("dn",),
     "pixel.source_follower": ("cutoff_hz",),
+    "pixel.high_pass": ("cutoff_hz",),
     "pixel.slew_limit": ("per_s",),
     "pixel.thresholds": ("on", "off", "mismatch", "drift_per_s"),
     "pixel.refractory": ("period_us",),

@@ -15,7 +15,7 @@ from adv2e.diagnosis.fitting.library import names
 
 SIZE, SECONDS, FPS = (32, 24), 0.25, 400.0
 
-RIVALS = {"event_loss", "leak", "low_pass", "refractory", "thresholds"}
+RIVALS = {"event_loss", "high_pass", "leak", "low_pass", "refractory", "thresholds"}
 """The effects that compete where there is one: with all, it takes five times as long."""
 
 
@@ -46,6 +46,7 @@ def test_nothing_is_found_where_nothing_is_missing(tmp_path):
     [
         ("leak", "pixel.leak.rate_hz", 6.0, 3),
         pytest.param("event_loss", "readout.loss.fraction", 0.45, 4, marks=pytest.mark.thorough),
+        pytest.param("high_pass", "pixel.high_pass.cutoff_hz", 4.0, 2, marks=pytest.mark.thorough),
     ],
 )
 def test_a_large_effect_is_named_and_fitted(name, key, truth, seed, tmp_path):

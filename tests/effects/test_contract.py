@@ -14,6 +14,7 @@ from harness import advance, quiet, start
 import adv2e.effects
 from adv2e.config import Config, from_dict, to_dict
 from adv2e.config.model import (
+    HighPass,
     HotPixels,
     Leak,
     LogResponse,
@@ -36,6 +37,7 @@ CASES = {
     "low_pass": (LowPass(cutoff_hz=120.0), LowPass()),
     "slew_limit": (SlewLimit(per_s=20.0), None),
     "source_follower": (SourceFollower(cutoff_hz=300.0), None),
+    "high_pass": (HighPass(cutoff_hz=10.0), None),
     "thresholds": (Thresholds(mismatch=0.05), Thresholds(mismatch=0.0)),
     "refractory": (Refractory(period_us=3000.0), Refractory(period_us=1e-9)),
     "reset_overshoot": (ResetOvershoot(fraction=0.2), ResetOvershoot(fraction=0.0)),

@@ -8,6 +8,7 @@ from harness import PIXELS, advance, at_rest, pure, quiet, solve, start
 from scipy import stats
 
 from adv2e.config.model import (
+    HighPass,
     Leak,
     LowPass,
     PhotoreceptorNoise,
@@ -54,6 +55,16 @@ CASES = {
     "leak": {"leak": Leak(rate_hz=0.5, jitter=0.2)},
     "long dead time": {"refractory": Refractory(period_us=2e4), "leak": Leak(rate_hz=1.0)},
     "shot noise": {"shot_noise": ShotNoise(rate_hz=0.5)},
+    "high-pass": {
+        "high_pass": HighPass(cutoff_hz=10.0),
+        "photoreceptor_noise": PhotoreceptorNoise(rms=0.07),
+    },
+    "high-pass, one pole": {
+        "high_pass": HighPass(cutoff_hz=10.0),
+        "source_follower": None,
+        "photoreceptor_noise": PhotoreceptorNoise(rms=0.055),
+        "leak": Leak(rate_hz=0.5),
+    },
     "in steps": {"low_pass": LowPass(update="euler"), "source_follower": None},
 }
 

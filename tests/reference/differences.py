@@ -39,13 +39,16 @@ class Truth:
         self.at = np.arange(len(signal)) * STEP_S
 
     @classmethod
-    def of_light(cls, light, times, *, slew=None, follower_hz=None, drive=None, signal=None):
+    def of_light(
+        cls, light, times, *, slew=None, follower_hz=None, high_hz=None, drive=None, signal=None
+    ):
         steps = round(times[-1] / STEP_S)
         at = np.arange(steps + 1) * STEP_S
         x = log_of(light, PURE)
         drive, signal = (f or (lambda t: np.zeros((len(t), 1))) for f in (drive, signal))
         y = x[0] + drive(at[:1])[0]
         z, b = y.copy(), 2 * np.pi * (follower_hz or 0.0) * STEP_S
+        slow, c = y.copy(), 2 * np.pi * (high_hz or 0.0) * STEP_S
         middles = at[:-1] + 0.5 * STEP_S
         added = drive(middles)
         result = np.empty((steps + 1, light.shape[1]))
@@ -58,10 +61,13 @@ class Truth:
             move = a / (1 + a / 2) * (xm + added[j] - y)
             if slew is not None:
                 move = np.clip(move, -slew * STEP_S, slew * STEP_S)
+            before = z if follower_hz else y
             if follower_hz:
                 z = z + b / (1 + b / 2) * (y + 0.5 * move - z)
             y = y + move
-            result[j + 1] = z if follower_hz else y
+            after = z if follower_hz else y
+            slow = slow + c / (1 + c / 2) * (0.5 * (before + after) - slow)
+            result[j + 1] = after - (slow - result[0])
         return cls(result + signal(at))
 
     def events(self, on=0.2, off=0.2, dead_s=None, overshoot=0.0, factor=None, noise=()):

@@ -193,6 +193,7 @@ def _of_the_photoreceptor(values: dict[str, Any]) -> Iterator[Candidate]:
     yield Candidate("low_pass", both, ((0.4 * a, 0.5 * b), (2.0 * a, 2.0 * b)))
     yield _of_one("dark_current", "pixel.dark_current.dn")
     yield _of_one("source_follower", "pixel.source_follower.cutoff_hz")
+    yield _of_one("high_pass", "pixel.high_pass.cutoff_hz")
     if not off:  # they act on it
         yield _of_one("slew_limit", "pixel.slew_limit.per_s")
         least = min(_now(values, f"pixel.thresholds.{sign}") for sign in ("on", "off"))

@@ -243,6 +243,31 @@ def _last_cycle(i, a, b, leak, other, dead, noise, exits, circuit):
 
 
 @kernel
+def _poles(corner, circuit):
+    """Return noise as the comparator sees it: rms, corner of the slower pole, and of the faster.
+
+    Noise behind a high-pass has no such law.  It is taken for noise of poles alone that is as
+    large, moves as fast, and bends as much: levels are crossed as often.
+    """
+    second, high = circuit.follower, circuit.high
+    share = second / (second + corner) if second > 0.0 else 1.0
+    rms, slow, fast = circuit.noise_rms * math.sqrt(share), corner, math.inf
+    if second > 0.0:
+        slow, fast = min(corner, second), max(corner, second)
+    if high > 0.0:
+        corner = max(corner, 1e-30)
+        rms *= math.sqrt(corner / (corner + high))
+        slow = corner + high
+        if second > 0.0:
+            rms *= math.sqrt(second / (second + high))
+            both = corner * second + (corner + second) * high  # product of the two
+            mean = 0.5 * (slow + second - corner * second * high / both)
+            fast = max(mean + math.sqrt(max(mean * mean - both, 0.0)), math.sqrt(both))
+            slow = both / fast
+    return rms, slow, fast
+
+
+@kernel
 def fill_running_noise(lo, hi, circuit, cell, start, light, on_level, off_level, exits, state):
     """Put the pixels lo..hi where they are at `start` [us], with noise and what leak has done.
 
@@ -260,16 +285,10 @@ def fill_running_noise(lo, hi, circuit, cell, start, light, on_level, off_level,
     """
     seed = circuit.seed
     for i in range(lo, hi):
-        corner = slow = circuit.dark + circuit.per_dn * light[i]
-        rms, share, ratio, shift = circuit.noise_rms, 1.0, 0.0, 0.0
-        if circuit.follower > 0.0:
-            share = circuit.follower / (circuit.follower + corner)
-            rms *= math.sqrt(share)
-            slow = min(corner, circuit.follower)
-            ratio = slow / max(corner, circuit.follower)
-        else:
-            shift = SAMPLING_SHIFT * math.sqrt(2.0 * slow * cell)
-        slow = max(slow, 1e-30)
+        corner = circuit.dark + circuit.per_dn * light[i]
+        rms, slow, fast = _poles(corner, circuit)
+        shift = SAMPLING_SHIFT * math.sqrt(2.0 * slow * cell) if circuit.follower == 0.0 else 0.0
+        ratio, slow = slow / fast, max(slow, 1e-30)
         on = state[per_pixel.ON, i]
         a, b = on * on_level[i] / rms, state[per_pixel.OFF, i] * off_level[i] / rms
         leak, dead = leak_rate(light[i], circuit) * on / (rms * slow), circuit.dead_time * slow
@@ -282,12 +301,14 @@ def fill_running_noise(lo, hi, circuit, cell, start, light, on_level, off_level,
         )
         reference = kept + beyond - fallen
         lower, upper = -_seen(b - reference, noise, exits), _seen(reference + a, noise, exits)
-        first = seen = 0.0
+        first = seen = past = 0.0
         for draw in range(_TRIES):
-            first, seen = stationary_noise(i, draw, share, circuit)
-            if left >= 0.0 or lower < seen / rms < upper:
+            first, seen, past = stationary_noise(i, draw, corner, circuit)
+            if left >= 0.0 or lower < (seen - past) / rms < upper:
                 break
         state[per_pixel.NOISE, i], state[per_pixel.SEEN, i] = first, seen
+        if circuit.high > 0.0:
+            state[per_pixel.SLOW, i] = past
         state[per_pixel.HOLD, i] = start + left * circuit.dead_time if left >= 0.0 else -1.0
         if circuit.causes:
             rest = state[per_pixel.REFERENCE, i]

@@ -64,6 +64,7 @@ class TimeStep(NamedTuple):
     share: float  # of its piece that is over at its end
     half: float  # half of that which it takes
     second: tuple[float, ...]  # weights of the second pole
+    high: tuple[float, ...]  # and of the high-pass
 
 
 class Pace(NamedTuple):
@@ -76,6 +77,7 @@ class Pace(NamedTuple):
     h: float
     half: float
     second: tuple[float, ...]
+    high: tuple[float, ...]
     brightest: float  # light of the frames [DN]
     alone: bool  # whether there is but one pole
     above: float  # least light of the strip, as a multiple of that at the knee, if there is
@@ -119,9 +121,11 @@ def _open(lo, count, n, circuit, run, injected, state, strip):
             strip[rows.NOISE + k] = state[per_pixel.NOISE, i]
             strip[rows.INPUT1 + k] += state[per_pixel.NOISE, i]
         strip[rows.SECOND + k] = state[per_pixel.SECOND, i]
-        strip[rows.SIGNAL1 + k] = (
+        strip[rows.BEHIND + k] = (
             strip[rows.SECOND + k] if circuit.follower > 0.0 else strip[rows.INPUT1 + k]
         )
+        strip[rows.SLOW + k] = state[per_pixel.SLOW, i]
+        strip[rows.SIGNAL1 + k] = strip[rows.BEHIND + k] - strip[rows.SLOW + k]
         strip[rows.REFERENCE + k] = state[per_pixel.REFERENCE, i]
         if circuit.causes:
             strip[rows.SEEN + k] = state[per_pixel.SEEN, i]
@@ -143,6 +147,8 @@ def _close(lo, count, draw, circuit, state, strip):
         state[per_pixel.X, i] = strip[rows.XB + k]
         state[per_pixel.FIRST, i] = strip[rows.FIRST + k]
         state[per_pixel.SECOND, i] = strip[rows.SECOND + k]
+        if circuit.high > 0.0:
+            state[per_pixel.SLOW, i] = strip[rows.SLOW + k]
         state[per_pixel.REFERENCE, i] = strip[rows.REFERENCE + k]
         if circuit.noise_rms > 0.0:
             state[per_pixel.NOISE, i] = strip[rows.NOISE + k]
@@ -229,12 +235,14 @@ def _make_step(lo, count, n, step, circuit, run, memory):
             signal.see_noise(n, circuit.follower > 0.0, step.second, strip)
     else:
         signal.no_noise(n, strip)
+    row, stepped = rows.INPUT1, circuit.update != EXACT
     if circuit.follower > 0.0:
-        stepped = circuit.update != EXACT
         signal.second_pole(n, circuit.follower * h, stepped, step.second, strip)
-        signal.take_signal(n, rows.SECOND, strip)
+        row = rows.SECOND
+    if circuit.high > 0.0:
+        signal.high_pass(n, circuit.high * h, stepped, step.high, row, strip)
     else:
-        signal.take_signal(n, rows.INPUT1, strip)
+        signal.take_signal(n, row, strip)
     if run.signal.shape[0] > 0:
         signal.add_to_signal(n, lo, count, run.signal, m, strip)
 
@@ -285,7 +293,7 @@ def _make_alone(lo, count, n, step, above, circuit, run, strip):
 def _step_of(j, m, draw, pace):
     """Return step j of an interval."""
     start, share = pace.start + pace.length * (j / pace.total), (j % pace.steps + 1) / pace.steps
-    return TimeStep(m, draw, start, pace.h, share, pace.half, pace.second)
+    return TimeStep(m, draw, start, pace.h, share, pace.half, pace.second, pace.high)
 
 
 @kernel
@@ -366,11 +374,12 @@ def _strip(lo, count, schedule, circuit, run, injected, state, memory, buffer, n
         _take_samples(count, schedule.begins and f == 0, last[f], last[f + 1], strip)
         h, half = length / total, 0.5 / steps
         second = signal.second_pole_weights(circuit.follower * h, circuit.update != EXACT)
+        high = signal.second_pole_weights(circuit.high * h, circuit.update != EXACT)
         first = run.first_step if f == run.first else 0
         _take_piece(n, first // steps, run.pieces, strip)
         above = one_pole.above_knee(count, circuit, strip) if alone else 0.0
         pace = Pace(
-            starts[f], length, total, steps, h, half, second, run.brightest[f], alone, above
+            starts[f], length, total, steps, h, half, second, high, run.brightest[f], alone, above
         )
         stop = run.last_step if f == run.last - 1 else total
         j = first
@@ -419,10 +428,10 @@ def run_stepped(claimed, most, schedule, circuit, run, injected, state, memory, 
 
 def _parts(claimed, most, schedule, circuit, run, injected, state, memory, buffer):
     """Return parts of :func:`run_stepped`, for a second process and this one."""
-    second, levels = (0.0,) * 5, (0.0,) * 4
+    pole, levels = (0.0,) * 5, (0.0,) * 4
     step, pace = (
-        TimeStep(0, 0, 0.0, 0.0, 0.0, 0.0, second),
-        Pace(0.0, 0.0, 0, 0, 0.0, 0.0, second, 0.0, False, 0.0),
+        TimeStep(0, 0, 0.0, 0.0, 0.0, 0.0, pole, pole),
+        Pace(0.0, 0.0, 0, 0, 0.0, 0.0, pole, pole, 0.0, False, 0.0),
     )
     event = 0, 0, step, levels, circuit, injected, state, memory.strip, buffer, 0
     own = [

@@ -25,7 +25,7 @@ _MOST = 0.999
 @inlined
 def covers(circuit, run):
     """Tell whether steps of a run may be made here, as far as the circuit decides it."""
-    stages = max(circuit.slew, circuit.follower, circuit.noise_rms)
+    stages = max(circuit.slew, circuit.follower, circuit.high, circuit.noise_rms)
     wide = max(run.gain.shape[1], run.signal.shape[1]) > 1
     is_solved = circuit.update == EXACT and circuit.filtered and not circuit.printed
     return is_solved and stages == 0.0 and not wide

@@ -39,6 +39,8 @@ _PADDED = WIDTH + 24  # rows must not share cache sets
     SLOPE0,  # of the signal at both ends [ln units a step]
     SLOPE1,
     SECOND,  # behind the second pole
+    BEHIND,  # before the high-pass, at the end of the step
+    SLOW,  # what that subtracts
     ADDED,  # to the signal
     SIGNAL0,
     SIGNAL1,
@@ -56,12 +58,12 @@ _PADDED = WIDTH + 24  # rows must not share cache sets
     SEEN0,  # the same as the comparator sees it, at the start and at the end
     SEEN,
     ADDED0,  # what is added to the signal, at the start
-) = range(0, 41 * _PADDED, _PADDED)
+) = range(0, 43 * _PADDED, _PADDED)
 
 
 def new_rows() -> NDArray[np.float64]:
     """Return the rows of a strip."""
-    size, line = 41 * _PADDED, 8
+    size, line = 43 * _PADDED, 8
     memory = np.zeros(size + line)
     # from the start of a cache line on: where vectors cross lines, steps take an eighth longer
     first = -(memory.ctypes.data // memory.itemsize) % line

@@ -98,6 +98,9 @@ def _limit_in_pieces(k, most, constant, per_dn, strip):
     strip[rows.SLOPE1 + k] = min(max(slope, -most), most)
 
 
+NO_POLE = 1.0, 0.0, 0.0, 0.0, 0.0
+"""Weights where there is no second pole, or no high-pass."""
+
 _SIXTH = 1.0 / 6.0
 _NODES, _WEIGHTS = (0.5 * v for v in np.polynomial.legendre.leggauss(12))
 _NODES = _NODES + 0.5
@@ -347,7 +350,7 @@ def second_pole_weights(b, line):
     b is its corner times the step; with `line` the input is a line, its slopes do not count.
     """
     if b == 0.0:
-        return 1.0, 0.0, 0.0, 0.0, 0.0
+        return NO_POLE
     decay = math.exp(-b)
     if line:
         mean = 1.0 - b / 2.0 + b * b / 6.0 if b < 1e-4 else -math.expm1(-b) / b
@@ -375,6 +378,26 @@ def second_pole(n, b, line, weights, strip):
         rise = after - before
         strip[rows.SLOPE0 + k] = rise if line else b * (in0 - before)
         strip[rows.SLOPE1 + k] = rise if line else b * (in1 - after)
+
+
+@kernel
+def high_pass(n, b, line, weights, row, strip):
+    """Subtract from a row what follows it as a second pole does; rows SIGNAL, and its slopes.
+
+    The equation is that of :mod:`adv2e.effects.pixel.high_pass`.
+    """
+    decay, w0, w1, v0, v1 = weights
+    for k in range(n):
+        before, in0, in1 = strip[rows.SLOW + k], strip[rows.BEHIND + k], strip[row + k]
+        slope0, slope1 = strip[rows.SLOPE0 + k], strip[rows.SLOPE1 + k]
+        after = decay * before + w0 * in0 + w1 * in1 + v0 * slope0 + v1 * slope1
+        strip[rows.SLOW + k] = after
+        strip[rows.BEHIND + k] = in1
+        strip[rows.SIGNAL0 + k] = strip[rows.SIGNAL1 + k]
+        strip[rows.SIGNAL1 + k] = in1 - after
+        rise = (in1 - after) - (in0 - before)
+        strip[rows.SLOPE0 + k] = rise if line else slope0 - b * (in0 - before)
+        strip[rows.SLOPE1 + k] = rise if line else slope1 - b * (in1 - after)
 
 
 @kernel

@@ -178,6 +178,7 @@ photoreceptor noise: pixel.photoreceptor_noise.rms=0.05
 source follower: pixel.source_follower.cutoff_hz=200
 fast source follower: pixel.source_follower.cutoff_hz=5000
 slew limit: pixel.slew_limit.per_s=20
+high pass: pixel.high_pass.cutoff_hz=5
 reset overshoot: pixel.reset_overshoot.fraction=0.3
 threshold drift: pixel.thresholds.drift_per_s=0.5
 all poles: pixel.source_follower.cutoff_hz=300; pixel.slew_limit.per_s=40; \
