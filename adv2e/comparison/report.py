@@ -51,8 +51,8 @@ def _told_apart(told: dict[str, Any]) -> list[str]:
     low, high = told["interval_95"]
     floors = ", ".join(f"{k} {v:.2f}" for k, v in told["floor"].items() if v is not None)
     lines = [
-        f"{'told_apart':<28}{told['value']:>10.2f}  ({low:.2f} to {high:.2f};"
-        f" floor: {floors or '-'}; 0.50: cannot be told)"
+        f"{'told_apart':<28}{told['value']:>10.2f}  ({low:.2f} to {high:.2f}; 0.5: cannot be told)",
+        *([f"  floor: {floors}"] if floors else []),
     ]
     largest = told["differences"]["largest"]
     lines += ["  simulated against measured, where they differ most:"] * bool(largest)

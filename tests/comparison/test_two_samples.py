@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -304,3 +306,22 @@ def test_sets_of_other_names_have_no_pairs(measured):
     assert report["pairs"] == 0
     assert report["told_apart"]["groups"] == len(measured) + len(other)
     assert 0.2 < report["told_apart"]["value"] < 0.8
+
+
+FOLDER = os.environ.get("ADV2E_REAL_DATA")
+
+
+@pytest.mark.skipif(not FOLDER, reason="ADV2E_REAL_DATA does not name a folder of recordings")
+def test_real_recordings_are_told_from_thinned_ones_and_not_from_others():
+    files = sorted((Path(FOLDER) / "atis-nmnist" / "known").glob("*.bin"))
+    quiet = {"doubt": lambda text: None}
+    halves = package.compare(files[:25], files[25:], **quiet)["told_apart"]
+    assert halves["interval_95"][0] < 0.5 < halves["interval_95"][1]
+    assert halves["differences"]["largest"] == []
+    draw, thinned = np.random.default_rng(1), []
+    for one in map(package.read_events, files):
+        events = one.events[draw.random(len(one)) < 0.85]
+        thinned.append(Recording(one.path, "array", one.width, one.height, events))
+    found = package.compare(files, thinned, **quiet)
+    assert found["pairs"] == 50
+    assert found["told_apart"]["value"] == pytest.approx(0.77, abs=0.05)
