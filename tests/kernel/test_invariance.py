@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 from harness import EVERYTHING, IN_LANES, advance, effect, quiet, start
 
-from adv2e.config.model import LowPass, Pixel, ResetOvershoot, SlewLimit, Thresholds
+from adv2e.config.model import (
+    HighPass,
+    LowPass,
+    Pixel,
+    ResetOvershoot,
+    SlewLimit,
+    Thresholds,
+)
 from adv2e.effects.hooks import INJECTED_DTYPE
 from adv2e.pixel import steps as stepping
 
@@ -17,6 +24,7 @@ FRAMES, ROWS, COLUMNS = 19, 48, 70
 ALL = {
     **EVERYTHING,
     "slew_limit": SlewLimit(per_s=30.0),
+    "high_pass": HighPass(cutoff_hz=3.0),
     "reset_overshoot": ResetOvershoot(fraction=0.2),
     "thresholds": Thresholds(on=0.2, off=0.25, mismatch=0.03, drift_per_s=2.0),
 }
@@ -24,7 +32,7 @@ ALL = {
 CASCADE = {
     name: section
     for name, section in ALL.items()
-    if name not in ("photoreceptor_noise", "slew_limit")
+    if name not in ("photoreceptor_noise", "slew_limit", "high_pass")
 }
 """Two poles, overshoot and drift."""
 
@@ -133,6 +141,7 @@ def test_noise_does_not_depend_on_other_effects():
     assert len(plain) > 20
     for more in (
         {"slew_limit": ALL["slew_limit"]},
+        {"high_pass": ALL["high_pass"]},
         {"reset_overshoot": ResetOvershoot(fraction=0.0)},
     ):
         assert run(quiet(**{**noisy, **more}), light).tobytes() == plain.tobytes()

@@ -8,6 +8,7 @@ from reference.differences import LIGHT, PURE, TIMES, Truth, check
 from reference.twin import light_of
 
 from adv2e.config.model import (
+    HighPass,
     Leak,
     LogResponse,
     Refractory,
@@ -99,10 +100,11 @@ def test_all_at_once():
         "thresholds": thresholds,
         "slew_limit": SlewLimit(per_s=40.0),
         "source_follower": SourceFollower(cutoff_hz=250.0),
+        "high_pass": HighPass(cutoff_hz=4.0),
         "reset_overshoot": ResetOvershoot(fraction=0.2),
         **DEAD,
     }
-    truth = Truth.of_light(LIGHT, TIMES, slew=40.0, follower_hz=250.0)
+    truth = Truth.of_light(LIGHT, TIMES, slew=40.0, follower_hz=250.0, high_hz=4.0)
     expected = truth.events(off=0.15, dead_s=9e-4, overshoot=0.2, factor=lambda t: 1 + 4 * t)
     check(solve(LIGHT, TIMES, pure(**sections)), expected, least=40)
 
