@@ -7,6 +7,7 @@ import pytest
 from camera.helpers import seen, still
 from harness import advance, at_rest, quiet, solve, start
 
+from adv2e.config import load_config
 from adv2e.config.model import (
     LogResponse,
     LowPass,
@@ -93,6 +94,21 @@ def test_photoreceptor_noise_makes_as_many_events_as_the_camera_has(follower_hz,
     events = sum(map(len, solve(light, times, pixel, seed=1, method=method)))
     assert events > 3000
     assert events == pytest.approx(len(stream.time), rel=0.06)
+
+
+def test_noise_of_the_davis346_rises_with_the_light_and_falls_again():
+    """ON and OFF, in a scene whose black is dark; as published counts of another camera do."""
+    pixel = load_config(["davis346"], ["pixel.photoreceptor_noise.rms=0.052"]).pixel
+    rates = []
+    for dn in (0.1, 0.6, 2.5, 25.0, 100.0):
+        events, _ = at_rest(dn, pixel, 4.0)
+        on = np.count_nonzero(events["p"])
+        rates.append((on, len(events) - on))
+    for counts in np.transpose(rates):
+        assert np.argmax(counts) == 2
+        assert counts[0] < 0.3 * counts[2] > 3 * counts[4]
+        assert counts[0] < counts[1]
+        assert counts[3] > counts[4]
 
 
 def test_noise_without_the_filter_that_limits_it_is_an_error():

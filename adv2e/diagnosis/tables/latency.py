@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from adv2e.config.model import Pixel, Sampling
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
-from adv2e.diagnosis.tables.problem import Array, Declared, Problem, Settings, of_one, row_errors
+from adv2e.diagnosis.tables.problem import (
+    DARK_CURRENT,
+    Array,
+    Declared,
+    Problem,
+    Settings,
+    of_one,
+    row_errors,
+)
 from adv2e.diagnosis.tables.table import Latencies
 from adv2e.effects.pixel.initial_reference import SETTLED
 from adv2e.effects.pixel.log_response import LogResponse
@@ -24,7 +32,6 @@ from adv2e.pixel.array import PixelArray
 
 CUTOFF = "pixel.low_pass.cutoff_hz"
 DARK_CUTOFF = "pixel.low_pass.dark_cutoff_hz"
-DARK_CURRENT = "pixel.dark_current.dn"
 FOLLOWER = "pixel.source_follower.cutoff_hz"
 SLEW = "pixel.slew_limit.per_s"
 OFFSET = "frames.clock_offset_us"

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from adv2e.diagnosis.fitting.candidates import NOTHING, Candidate, FitParameter
 from adv2e.diagnosis.tables.noise import NoisySources, Rates, at_least, noise_rates
-from adv2e.diagnosis.tables.problem import Array, Declared, Problem, Settings, row_errors
+from adv2e.diagnosis.tables.problem import (
+    DARK_CURRENT,
+    Array,
+    Declared,
+    Problem,
+    Settings,
+    of_one,
+    row_errors,
+)
 from adv2e.diagnosis.tables.table import Noise
 
 LEAK = "pixel.leak.rate_hz"
@@ -56,6 +64,9 @@ class NoiseProblem(Problem):
     Photoreceptor noise is tried with its rms alone, or, where shares tell how rates are spread
     over the pixels, with all that shapes it and is not declared: the corners of both poles, the OFF
     threshold beside ON, and the mismatch.  Then hot pixels have a fraction and a spread of rates.
+
+    Dark current is light to the pixel: it lifts the first corner, too.  It is tried where the noise
+    is declared; else the corner in the dark, which is fitted, takes its place.
 
     Parameters
     ----------
@@ -151,7 +162,8 @@ class NoiseProblem(Problem):
             hot_spread=self.declared.value(values, HOT_SPREAD),
             hot_off=self.declared.value(values, HOT_OFF),
         )
-        return noise_rates(sources, light / self.white)
+        dark = self.declared.value(values, DARK_CURRENT) / 255.0
+        return noise_rates(sources, light / self.white + dark)
 
     def predict(self, values: Mapping[str, float]) -> Array:
         """Return ln(rate + floor) [Hz], (rows,)."""
@@ -212,6 +224,9 @@ class NoiseProblem(Problem):
         level = min(thresholds.on, thresholds.off)
         rms = RMS, level / 9, level
         if not self.spread_shows:
+            if DARK_CURRENT not in self.declared.written and self.declared.held(RMS):
+                at = 255.0 / self.white * float(self.light.min())
+                yield of_one("dark_current", DARK_CURRENT, at, 10.0 * at, 100.0 * at)
             yield _several("photoreceptor_noise", [(*rms, (level / 3, level / 5))])
         else:
             starts = zip(*_SHAPE_STARTS, strict=True)

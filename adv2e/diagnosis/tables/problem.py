@@ -16,6 +16,8 @@ from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 
 Array = NDArray[np.float64]
 
+DARK_CURRENT = "pixel.dark_current.dn"
+
 
 @dataclass(frozen=True)
 class Settings:

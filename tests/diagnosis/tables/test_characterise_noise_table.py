@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from harness import at_rest, quiet
 
+from adv2e.config.model import (
+    LowPass,
+    PhotoreceptorNoise,
+    Refractory,
+    SourceFollower,
+    Thresholds,
+)
 from adv2e.diagnosis.tables.characterise import characterise, problem_of
 from adv2e.diagnosis.tables.noise import NoisySources, noise_rates
 from adv2e.diagnosis.tables.problem import Settings, read_declared
@@ -133,6 +141,34 @@ def test_off_events_that_stay_in_bright_light_are_those_of_hot_pixels():
     assert parameters["pixel.hot_pixels.off_fraction"] == pytest.approx(off[hot].mean(), rel=0.05)
     mean = parameters["pixel.hot_pixels.fraction"] * parameters["pixel.hot_pixels.rate_hz"]
     assert mean == pytest.approx(20.0 * hot.mean(), rel=0.05)
+
+
+def test_dark_current_lifts_the_corner_of_the_noise():
+    """Counts of simulated pixels: noise in the dark follows as much light as dark current is."""
+    dark, sets = 8.0, {"dark_cutoff_hz": 0.1, "cutoff_hz": 600.0}
+    pixel = quiet(
+        photoreceptor_noise=PhotoreceptorNoise(rms=0.055),
+        low_pass=LowPass(**sets),
+        source_follower=SourceFollower(cutoff_hz=100.0),
+        thresholds=Thresholds(on=0.2, off=0.23, mismatch=0.0),
+        refractory=Refractory(period_us=500.0),
+        initial_reference="running",
+    )
+    counts = []
+    for lux in LUX:
+        events, _ = at_rest(0.255 * lux + dark, pixel, SECONDS, pixels=PIXELS)
+        on = np.count_nonzero(events["p"])
+        counts.append((on, len(events) - on))
+    on_hz, off_hz = np.transpose(counts) / (PIXELS * SECONDS)
+    keys = [f"pixel.low_pass.{key}={value}" for key, value in sets.items()]
+    keys += ["pixel.photoreceptor_noise.rms=0.055", "pixel.source_follower.cutoff_hz=100"]
+    keys += ["pixel.thresholds.off=0.23", "pixel.refractory.period_us=500"]
+    measured = table(on_hz, off_hz)
+    found = verdict_of(measured, keys)
+    assert [effect.name for effect in found.effects] == ["dark_current"]
+    assert found.effects[0].parameters["pixel.dark_current.dn"] == pytest.approx(dark, rel=0.15)
+    held = verdict_of(measured, [*keys, f"pixel.dark_current.dn={dark}"])
+    assert held.errors[0].before.value < 0.3 * found.errors[0].before.value
 
 
 @pytest.mark.thorough
