@@ -20,8 +20,8 @@ from adv2e.reports.result import Band, Curve, Diagnosis, ErrorRow, Estimate, Fin
 
 _REMARKS = {
     "consistent": "The declared model fits the table within its errors: keep that model as it is.",
-    "unexplained": "No effect does better than a constant ({change}, {constant:.3g} with it): do"
-    " not add any.",
+    "unexplained": "No effect predicts light held out: do not add any ({change} adding {best}, the"
+    " best; {constant:.3g} with a constant).",
     "not_identifiable": "The table cannot tell these effects apart ({change}): only another table"
     " tells which is right.",
     "partly_explained": "More than the errors of the table is left ({change}): use the model found,"
@@ -60,12 +60,15 @@ def characterise(table: Table, declared: Declared, settings: Settings | None = N
         if "[" not in key:  # or it is no key, but a threshold of the table
             set_key(model, key, value)
     effects = _findings(after, selector)
-    change = f"error on light held out: {before.error:.3g} before, {after.error:.3g} after"
+    best = chosen.best if chosen.verdict == "unexplained" else after
+    change = f"error on light held out: {before.error:.3g} before, {best.error:.3g} after"
     names = dict.fromkeys(name for rival in chosen.alternatives for name in rival.names)
     others = [name for name in names if name not in after.names]
     return Diagnosis(
         verdict=chosen.verdict,
-        remark=_REMARKS[chosen.verdict].format(change=change, constant=selector.constant),
+        remark=_REMARKS[chosen.verdict].format(
+            change=change, best=" + ".join(best.names), constant=selector.constant
+        ),
         recording=shown(table.name),
         declared=declared.name,
         effects=effects,

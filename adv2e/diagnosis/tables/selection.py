@@ -10,8 +10,10 @@ table needs a fit of its own.
 
 Only then are effects added, up to three, one after another to the best set so far: the one with the
 least held-out error, if that is lower than before by more than the best of all n sets of that size
-would be by chance if all were useless, sqrt(2 ln n) standard errors of the difference over the
-light levels held out.  Other sets of that size that fit as well are look-alikes.
+would be by chance if all were useless, sqrt(2 ln n) standard errors of the gain over the light
+levels held out.  The gain of a level is what the mean square falls by, or that over the sum of both
+and the floor: an effect that acts in bright light gains most there, and that is no chance.  Other
+sets of that size that fit as well are look-alikes.
 """
 
 from __future__ import annotations
@@ -99,10 +101,15 @@ class FittedSet:
 
 @dataclass(frozen=True)
 class Choice:
-    """Result of a selection; `alternatives`: sets of the same size that fit as well."""
+    """Result of a selection.
+
+    `best` has the least held-out error of all, taken or not; `alternatives` are sets of the size of
+    `after` that fit as well.
+    """
 
     before: FittedSet
     after: FittedSet
+    best: FittedSet
     verdict: Verdict
     alternatives: list[FittedSet]
     rejected: list[Rejected]
@@ -133,7 +140,7 @@ class Selector:
         p = self.drawn(before).p
         log(f"declared model: held-out error {before.error:.3f}, p = {p:.3f}")
         if p >= SIGNIFICANT:
-            return Choice(before, before, "consistent", [], [])
+            return Choice(before, before, before, "consistent", [], [])
         after = best = before
         tried: list[list[FittedSet]] = []
         for size in range(1, min(MOST_EFFECTS, len(candidates)) + 1):
@@ -144,27 +151,41 @@ class Selector:
             tried.append(found)
             best = min(found, key=lambda one: one.error)
             log(f"{size}: {' + '.join(best.names)}, held-out error {best.error:.3f}")
-            if lower(best, after, math.comb(len(candidates), size)):
+            if self._lower(best, after, math.comb(len(candidates), size)):
                 after = best
                 if self.drawn(after).p >= SIGNIFICANT:
                     break
             elif size > 1:  # of one only, two may hide each other
                 break
+        best = min((one for models in tried for one in models), key=lambda one: one.error)
         if after is before or not self._is_believed(after, before):
-            return Choice(before, before, "unexplained", [], _rejected(tried, before, before, []))
+            rejected = self._rejected(tried, before, before, [])
+            return Choice(before, before, best, "unexplained", [], rejected)
         alternatives = [
             rival
             for rival in tried[len(after.effects) - 1]
             if rival.names != after.names  # or a few keys more of the same
-            and lower(rival, before, 1)
+            and self._lower(rival, before, 1)
             and self._as_well(rival, after)
         ]
         verdict: Verdict = "not_identifiable"
         if not alternatives:
             verdict = "explained" if self.drawn(after).p >= SIGNIFICANT else "partly_explained"
-        return Choice(
-            before, after, verdict, alternatives, _rejected(tried, before, after, alternatives)
-        )
+        rejected = self._rejected(tried, before, after, alternatives)
+        return Choice(before, after, best, verdict, alternatives, rejected)
+
+    def _lower(self, model: FittedSet, than: FittedSet, best_of: int) -> bool:
+        """Tell whether the held-out error is lower by more than chance makes it.
+
+        `best_of`: number n of models of which this is the best; the best of n useless ones gains
+        some sqrt(2 ln n) standard errors.
+        """
+        gain = than.errors - model.errors
+        if gain.size < 2 or gain.mean() <= 0.0:
+            return False
+        gains = np.stack([gain, gain / (than.errors + model.errors + self.floors)])
+        needed = max(1.0, math.sqrt(2.0 * math.log(best_of))) / math.sqrt(gain.size)
+        return bool((gains.mean(axis=1) > needed * gains.std(axis=1, ddof=1)).any())
 
     def _determined(self, chosen: tuple[Candidate, ...]) -> bool:
         """Tell whether every fold has more rows than parameters."""
@@ -252,43 +273,30 @@ class Selector:
             errors.append(self._mean_square(gap, unit))
         return float(np.sqrt(np.mean(errors)))
 
+    def _rejected(
+        self, tried: list[list[FittedSet]], before: FittedSet, after: FittedSet,
+        alternatives: list[FittedSet],
+    ) -> list[Rejected]:  # fmt: skip
+        """Return the rejected sets with reasons; of two and more effects, the best of each size."""
+        out = []
+        for size, models in enumerate(tried, 1):
+            for model in models if size == 1 else [min(models, key=lambda one: one.error)]:
+                if model is after or model in alternatives:
+                    continue
+                ratio = f"held-out error {model.error:.3f}, declared {before.error:.3f}"
+                if not self._lower(model, before, 1):
+                    reason = f"does not lower it by more than chance: {ratio}"
+                elif after is before:
+                    reason = f"leaves too much, or predicts no better than a constant: {ratio}"
+                elif size > len(after.effects):
+                    reason = f"not lower by more than a standard error than with fewer: {ratio}"
+                else:
+                    reason = f"fits worse: {ratio}, that taken {after.error:.3f}"
+                share = model.error / before.error
+                out.append(Rejected(" + ".join(model.names), reason, model.settings, share))
+        return out
+
 
 def _borders(joint: Candidate) -> Array:
     """Return the logarithms of the least and the largest parameters, (2, parameters)."""
     return np.log([[one.low, one.high] for one in joint.parameters]).reshape(-1, 2).T
-
-
-def _rejected(
-    tried: list[list[FittedSet]], before: FittedSet, after: FittedSet, alternatives: list[FittedSet]
-) -> list[Rejected]:
-    """Return the rejected sets with reasons; of two and more effects, the best of each size."""
-    out = []
-    for size, models in enumerate(tried, 1):
-        for model in models if size == 1 else [min(models, key=lambda one: one.error)]:
-            if model is after or model in alternatives:
-                continue
-            ratio = f"held-out error {model.error:.3f}, declared {before.error:.3f}"
-            if not lower(model, before, 1):
-                reason = f"does not lower it by more than its standard error: {ratio}"
-            elif after is before:
-                reason = f"leaves too much, or predicts no better than a constant: {ratio}"
-            elif size > len(after.effects):
-                reason = f"not lower by more than a standard error than with fewer: {ratio}"
-            else:
-                reason = f"fits worse: {ratio}, that taken {after.error:.3f}"
-            share = model.error / before.error
-            out.append(Rejected(" + ".join(model.names), reason, model.settings, share))
-    return out
-
-
-def lower(model: FittedSet, than: FittedSet, best_of: int) -> bool:
-    """Tell whether the held-out error is lower by more than the standard error of the difference.
-
-    `best_of`: number n of models of which this is the best; the best of n useless ones gains some
-    sqrt(2 ln n) standard errors.
-    """
-    gain = than.errors - model.errors
-    if gain.size < 2:
-        return False
-    needed = max(1.0, math.sqrt(2.0 * math.log(best_of)))
-    return bool(gain.mean() > needed * gain.std(ddof=1) / math.sqrt(gain.size))

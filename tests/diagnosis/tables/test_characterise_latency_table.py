@@ -345,3 +345,31 @@ def test_two_keys_of_one_effect_are_one_finding():
     names = [effect.name for effect in found.effects]
     assert len(names) == len(set(names))
     assert "low_pass and low_pass" not in found.sentence
+
+
+def test_a_second_pole_that_shows_in_bright_light_alone_is_more_than_chance():
+    """The brighter, the more it explains; the brightest is read badly, and wrongly where judged."""
+    light = np.array([6.0, 46.0, 166.0, 277.0, 398.0])
+    latency = np.array([ode_latency_us(one * 300.0 / 398.0, follower_hz=3000.0) for one in light])
+    off = np.array([1.0, 1.0, 1.0, 1.0, 2.0])
+    relative = np.array([0.01, 0.01, 0.01, 0.01, 0.2])
+    lines = ["camera,irradiance_W_m2,latency_us,latency_error_us"]
+    for camera, values in (("A", latency), ("B", latency * off * 0.93)):
+        for one, value, share in zip(light, values, relative, strict=True):
+            lines.append(f"{camera},{one},{value},{share * value}")
+    measured = parse_table("\n".join(lines), "two.csv")
+    found = characterise(measured, read_declared(), Settings(judge=["camera=B"], draws=40))
+    assert found.verdict != "unexplained"
+    named = {*(effect.name for effect in found.effects), *found.alternatives}
+    assert "source_follower" in named
+    assert found.errors[0].after.value < 0.5 * found.errors[0].before.value
+
+
+def test_what_is_unexplained_says_how_near_the_best_comes():
+    """Latency that rises with the light: no pole does that."""
+    found = characterise(table(100.0 * LIGHT**0.3), read_declared(), Settings(draws=40))
+    assert found.verdict == "unexplained"
+    assert "No effect predicts light held out" in found.remark
+    before = found.errors[0].before.value
+    assert f"{before:.3g} before" in found.remark
+    assert "with a constant" in found.remark
