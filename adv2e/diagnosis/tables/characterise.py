@@ -26,6 +26,8 @@ _REMARKS = {
     " tells which is right.",
     "partly_explained": "More than the errors of the table is left ({change}): use the model found,"
     " but know what still differs.",
+    "together": "Only together do these effects meet all rows within their errors. So few light"
+    " levels do not tell one that is held out ({change}).",
     "explained": "What is left is within the errors of the table ({change}): use the model found.",
 }
 
@@ -66,9 +68,9 @@ def characterise(table: Table, declared: Declared, settings: Settings | None = N
     others = [name for name in names if name not in after.names]
     return Diagnosis(
         verdict=chosen.verdict,
-        remark=_REMARKS[chosen.verdict].format(
-            change=change, best=" + ".join(best.names), constant=selector.constant
-        ),
+        remark=_REMARKS[
+            "together" if chosen.together and not chosen.alternatives else chosen.verdict
+        ].format(change=change, best=" + ".join(best.names), constant=selector.constant),
         recording=shown(table.name),
         declared=declared.name,
         effects=effects,

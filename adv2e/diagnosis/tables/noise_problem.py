@@ -126,7 +126,8 @@ class NoiseProblem(Problem):
         }
         self.groups = {_title(kind): rows for kind, rows in self._rows.items()}
         self.nuisances = NOTHING
-        self.candidates = list(self._candidates(rate))
+        fired = np.array([data.rates[kind][k] > 0.0 for kind, k in cells])
+        self.candidates = list(self._candidates(rate, fired))
         known = (LEAK, PHOTO_LEAK, SHOT, MISMATCH)
         self.neutral = {key: 0.0 for key in known if declared.written.get(key) is None}
         self.notes = [
@@ -188,7 +189,7 @@ class NoiseProblem(Problem):
         logs: Array = np.log(rate + self.floor)
         return logs
 
-    def _candidates(self, rate: Array) -> Iterator[Candidate]:
+    def _candidates(self, rate: Array, fired: NDArray[np.bool_]) -> Iterator[Candidate]:
         least = float(np.where(self.floor > 0.0, self.floor, rate).min())
         most = float(max(rate.max(), 10 * self.floor.max()))
         typical = float(np.exp(np.median(np.log(rate + self.floor))))
@@ -213,9 +214,9 @@ class NoiseProblem(Problem):
             share = HOT_FRACTION, 1e-3, 0.5, (0.02, 0.1, 0.3)
             hot = _several("hot_pixels", [share, rates, spread])
         yield hot
-        dimmed = [kind.startswith("off") for kind in self._kinds]
-        bright = np.array(dimmed) & (self.level == self.level.max())
-        if HOT_OFF not in self.declared.written and rate[bright].any():
+        off_kinds = np.array([kind.startswith("off") for kind in self._kinds])
+        bright = fired & off_kinds & (self.level == self.level.max())
+        if HOT_OFF not in self.declared.written and bright.any():
             keys = *hot.parameters, FitParameter(HOT_OFF, 1e-3, 1.0)
             yield replace(hot, parameters=keys, starts=tuple((*at, 0.3) for at in hot.starts))
         thresholds = self.declared.config.pixel.thresholds

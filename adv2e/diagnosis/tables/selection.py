@@ -14,6 +14,12 @@ would be by chance if all were useless, sqrt(2 ln n) standard errors of the gain
 levels held out.  The gain of a level is what the mean square falls by, or that over the sum of both
 and the floor: an effect that acts in bright light gains most there, and that is no chance.  Other
 sets of that size that fit as well are look-alikes.
+
+Of three light levels or fewer, one that is held out lies far beyond the others, and tells little of
+effects that fit.  If nothing meets such a table within its errors, all effects are fitted together
+to all rows, at least twice as many as there are parameters.  If they meet the table (a sum of
+squares within three standard errors of chance), those are dropped, one after another, without which
+the rest fits as well.
 """
 
 from __future__ import annotations
@@ -37,6 +43,8 @@ LOOK_ALIKE = 9.0
 """Difference in the sum of squares, in units of its spread: three standard errors."""
 SKILL = 0.5
 """Least share of the error of a constant that a model must be free of on held-out levels."""
+FEW_LEVELS = 3
+"""Light levels of which one that is held out lies beyond what the others tell."""
 NEAR = 3.0
 """Held-out error, in floors, up to which a model that fits needs no such share."""
 _OF_FOLDS = 1e-3
@@ -104,7 +112,7 @@ class Choice:
     """Result of a selection.
 
     `best` has the least held-out error of all, taken or not; `alternatives` are sets of the size of
-    `after` that fit as well.
+    `after` that fit as well.  `together`: chosen for meeting all rows, not light held out.
     """
 
     before: FittedSet
@@ -113,6 +121,7 @@ class Choice:
     verdict: Verdict
     alternatives: list[FittedSet]
     rejected: list[Rejected]
+    together: bool = False
 
 
 class Selector:
@@ -158,6 +167,17 @@ class Selector:
             elif size > 1:  # of one only, two may hide each other
                 break
         best = min((one for models in tried for one in models), key=lambda one: one.error)
+        if self.drawn(after).p < SIGNIFICANT and (met := self._together()):
+            after, alternatives = met[0], [one for one in met[1:] if one.names != met[0].names]
+            verdict: Verdict = "not_identifiable" if alternatives else "explained"
+            reason = (
+                f"leaves more than the errors of the table, which {' + '.join(after.names)} meet"
+            )
+            rejected = [
+                Rejected(one.names[0], reason, one.settings, one.error / before.error)
+                for one in tried[0]
+            ]
+            return Choice(before, after, best, verdict, alternatives, rejected, together=True)
         if after is before or not self._is_believed(after, before):
             rejected = self._rejected(tried, before, before, [])
             return Choice(before, before, best, "unexplained", [], rejected)
@@ -168,11 +188,44 @@ class Selector:
             and self._lower(rival, before, 1)
             and self._as_well(rival, after)
         ]
-        verdict: Verdict = "not_identifiable"
+        verdict = "not_identifiable"
         if not alternatives:
             verdict = "explained" if self.drawn(after).p >= SIGNIFICANT else "partly_explained"
         rejected = self._rejected(tried, before, after, alternatives)
         return Choice(before, after, best, verdict, alternatives, rejected)
+
+    def _together(self) -> list[FittedSet]:
+        """Return the sets that meet all rows of a table of few lights, none of them with a part.
+
+        All have as many effects; the first fits best.  None: all effects together do not meet it.
+        """
+        chosen = tuple({one.name: one for one in reversed(self.problem.candidates)}.values())[::-1]
+        keys = len(self.problem.nuisances.parameters) + sum(len(one.parameters) for one in chosen)
+        if len(self._units) > FEW_LEVELS or self._train.sum() < 2 * keys:
+            return []
+        whole = self._fitted_to_all(chosen, None)
+        freedom = float(self._train.sum()) - keys
+        if whole.misfit > freedom + math.sqrt(LOOK_ALIKE * 2.0 * freedom):
+            return []
+        met, found = [whole], [whole]
+        while found := [one for one in found if self._as_well(one, whole)]:
+            met = sorted(found, key=lambda one: one.misfit)
+            self._settings.log(f"{' + '.join(met[0].names)} meet all rows: {met[0].misfit:.1f}")
+            found = [
+                self._fitted_to_all(tuple(e for e in met[0].effects if e is not left), met[0])
+                for left in (met[0].effects if len(met[0].effects) > 1 else ())
+            ]
+        return [self.fitted(one.effects, one.point) for one in met]
+
+    def _fitted_to_all(self, effects: tuple[Candidate, ...], model: FittedSet | None) -> FittedSet:
+        """Fit `effects` to all rows, none held out; from the values of a larger model, if any."""
+        joint = Candidate.joined([self.problem.nuisances, *effects])
+        starts = [np.array(joint.scaled(start)) for start in joint.starts]
+        if model is not None:
+            values = [model.settings[one.key] for one in joint.parameters]
+            starts = [np.array(joint.scaled(values))]
+        point, misfit = self._fit(joint, self._train, starts, self.problem.tolerance)
+        return FittedSet(effects, joint, point, misfit, np.full(len(self._units), np.nan))
 
     def _lower(self, model: FittedSet, than: FittedSet, best_of: int) -> bool:
         """Tell whether the held-out error is lower by more than chance makes it.
@@ -209,10 +262,14 @@ class Selector:
         spread = max(1.0, best.misfit / freedom)
         return (rival.misfit - best.misfit) / spread <= LOOK_ALIKE
 
-    def fitted(self, effects: tuple[Candidate, ...]) -> FittedSet:
-        """Fit the declared model with `effects`, to all rows and without each level."""
+    def fitted(self, effects: tuple[Candidate, ...], point: Array | None = None) -> FittedSet:
+        """Fit the declared model with `effects`, to all rows and without each level.
+
+        `point` : where that to all rows ends, if it is known.
+        """
         joint = Candidate.joined([self.problem.nuisances, *effects])
         starts = [np.array(joint.scaled(start)) for start in joint.starts]
+        starts = starts if point is None else [point]
         point, misfit = self._fit(joint, self._train, starts, self.problem.tolerance)
         errors = np.empty(len(self._units))
         for k, (fold, unit) in enumerate(zip(self._folds, self._units, strict=True)):

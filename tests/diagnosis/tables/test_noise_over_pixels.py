@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adv2e.diagnosis.tables.characterise import problem_of
+from adv2e.diagnosis.tables.characterise import characterise, problem_of
 from adv2e.diagnosis.tables.noise import NoisySources, noise_rates
 from adv2e.diagnosis.tables.problem import Settings, read_declared
 from adv2e.diagnosis.tables.selection import Selector
@@ -28,15 +28,15 @@ TRUTH = NoisySources(
 )  # fmt: skip
 
 
-def table(sources):
-    rates, seconds = noise_rates(sources, LIGHT / 255.0), np.full(LIGHT.size, SECONDS)
+def table(sources, light=LIGHT):
+    rates, seconds = noise_rates(sources, light / 255.0), np.full(light.size, SECONDS)
     rng = np.random.default_rng(3)
-    columns = {"light_dn": LIGHT}
+    columns = {"light_dn": light}
     for polarity in ("on", "off"):
         for number in NUMBERS:
             share = rates.share_having(number, seconds, polarity == "on")
             columns[f"{polarity}_share_{number}"] = rng.binomial(PIXELS, share) / PIXELS
-    columns["pixels"], columns["duration_s"] = [PIXELS] * LIGHT.size, seconds
+    columns["pixels"], columns["duration_s"] = [PIXELS] * light.size, seconds
     lines = [",".join(columns)]
     lines += [",".join(map(str, row)) for row in zip(*columns.values(), strict=True)]
     return parse_table("\n".join(lines), "noise.csv")
@@ -72,3 +72,27 @@ def test_hot_pixels_that_are_spread_are_named():
     assert chosen.after.names == ("hot_pixels",)
     assert chosen.after.settings["pixel.hot_pixels.spread"] == pytest.approx(0.7, rel=0.3)
     assert chosen.after.settings["pixel.hot_pixels.fraction"] == pytest.approx(0.05, rel=0.2)
+
+
+@pytest.mark.parametrize("shot_hz", [0.3, 0.0])
+@pytest.mark.thorough
+def test_three_lights_are_met_by_all_that_is_needed_and_no_more(shot_hz):
+    """No effect, nor two or three, meet them; and none is a pile of half of the pixels, all hot."""
+    light = np.array([0.1, 20.0, 255.0])
+    sources = NoisySources(
+        leak_hz=0.15, photo_leak_hz=0.5, shot_hz=shot_hz, dead_time_s=5e-4, hot_fraction=0.05,
+        hot_hz=1.5, hot_spread=0.5,
+    )  # fmt: skip
+    settings = Settings(white=255.0, draws=40)
+    declared = read_declared([], ["pixel.low_pass=null", "pixel.refractory.period_us=500"])
+    measured = table(sources, light)
+    problem = problem_of(measured, declared, settings)
+    chosen = Selector(problem, settings).select()
+    needed = {"leak", "photo_leak", "hot_pixels"} | ({"shot_noise"} if shot_hz else set())
+    assert chosen.verdict == "explained"
+    assert set(chosen.after.names) == needed
+    found = chosen.after.settings
+    assert found["pixel.hot_pixels.fraction"] == pytest.approx(0.05, rel=0.2)
+    assert found["pixel.leak.photo_rate_hz"] == pytest.approx(0.5, rel=0.1)
+    assert found.get("pixel.shot_noise.rate_hz", 0.0) == pytest.approx(shot_hz, rel=0.1)
+    assert characterise(measured, declared, settings).verdict == "explained"
