@@ -116,11 +116,11 @@ def test_says_what_it_is(name):
         fit = declared.fit
         if fit is not None:
             assert declared.complaint(fit.low) is declared.complaint(fit.high) is None
-    # what is known of a circuit, not measured, is nothing to fit
+    # what is known of a circuit, not measured, is nothing to fit; tables alone tell off_fraction
     fitted = {
         f.name for f in dataclasses.fields(section) if f.metadata["parameter"].fit is not None
     }
-    given = {"linear_below", "floor", "update", "jitter", "step"}
+    given = {"linear_below", "floor", "update", "jitter", "step", "off_fraction"}
     assert fitted | given >= {f.name for f in dataclasses.fields(section)}
 
 
