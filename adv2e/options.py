@@ -500,6 +500,24 @@ class DiagnoseOptions(EventInput, Run, total=False):
             completes="files",
         ),
     ]
+    film: Annotated[
+        "str | Path | None",
+        Option(
+            help="What the camera saw, in the place of frames: a video, or one picture before which"
+            " it moved. How it saw that is fitted.",
+            metavar="FILM",
+            completes="files",
+        ),
+    ]
+    films: Annotated[
+        "str | Path | None",
+        Option(
+            help="The same for many recordings of one camera: a table with the columns events and"
+            " film, names of files beside it.",
+            metavar="TABLE",
+            completes="files",
+        ),
+    ]
     without: Annotated[
         "Sequence[str]",
         Option(

@@ -18,14 +18,14 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1445,
+    "": 1470,
     "batches": 1340,
-    "cli": 1290,
+    "cli": 1300,
     "comparison": 1165,
     "compilation": 285,
     "config": 1305,
     "conversion": 1190,
-    "diagnosis": 6930,
+    "diagnosis": 8230,
     "effects": 1548,
     "exporting": 470,
     "files": 780,
@@ -37,14 +37,14 @@ LIMITS = {
     "pixel": 575,
     "process": 265,
     "rendering": 740,
-    "reports": 1772,
+    "reports": 1800,
     "representations": 112,
     "sources": 3610,
     "synthetic": 160,
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 315
+FILES = 324
 """Most modules of all packages together."""
 
 _SLACK = 60

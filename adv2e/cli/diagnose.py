@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 
 @click.command("diagnose", cls=Command)
-@click.argument("recording", metavar="RECORDING", shell_complete=completion.files)
+@click.argument("recordings", metavar="RECORDING...", nargs=-1, shell_complete=completion.files)
 @options.config_options
 @options.output_options
 @options.reporting_options
 @options.declared_options(DiagnoseOptions, help={"start_s": "Here, the first frame."})
 def command(
-    recording: str,
+    recordings: tuple[str, ...],
     config: Callable[[Size | None], Config],
     output: str | None,
     overwrite: bool,
@@ -47,6 +47,12 @@ def command(
     a leap. A column 'light_dn X Y COLUMNS ROWS' is the light of a rectangle. 'adv2e protocol' says
     what to record.
 
+    With --film, RECORDING holds events of a screen that showed a known film, or a picture before
+    which the camera moved, as N-MNIST was recorded. How the camera saw it (path, scale, turn, blur,
+    grey curve) is fitted and told apart from the camera. Many recordings of one camera may be given
+    at once: half of them judge what was fitted to the others. --films names those that saw each its
+    own picture.
+
     DIR (-o; default: <stem>.diagnosis) gets report.html with the pictures, report.json, and
     model.yaml, the declared model with what was found, for 'adv2e convert -c'. Until the end, they
     hold what is known so far, and say so; Ctrl-C leaves them.
@@ -57,6 +63,7 @@ def command(
       adv2e diagnose recording.zip -c declared.yaml -o diagnosis
       adv2e diagnose recording.zip -c davis346 --without flicker
       adv2e diagnose led.raw --light stimulus.csv -c declared.yaml --fit-thresholds
+      adv2e diagnose --films pairs.csv --size 34x34 -c declared.yaml --fit-thresholds
     """
     from pathlib import Path
 
@@ -68,9 +75,10 @@ def command(
     declared = config(given["size"])
     params = click.get_current_context().params
     layers = params["config_files"], params["sets"]
-    folder = Path(output or f"{Path(recording).stem}.diagnosis")
+    named = given["films"] if given["films"] and not recordings else (*recordings, "")[0]
+    folder = Path(output or f"{Path(named).stem}.diagnosis")
     found = diagnose_file(
-        recording,
+        recordings,
         declared,
         name=names_of(*layers),
         written=written_keys(*layers),

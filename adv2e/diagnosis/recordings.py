@@ -8,16 +8,20 @@ import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from adv2e.background import default_threads
 from adv2e.config import Config, Written, files_among, load_config, names_of, written_keys
 from adv2e.config.user_effects import user_effects
 from adv2e.diagnosis.configurations import without_user_effects
 from adv2e.diagnosis.data.evidence import part_of, read_evidence
 from adv2e.diagnosis.diagnose import diagnose as diagnose_evidence
+from adv2e.diagnosis.film.diagnose import diagnose_films
+from adv2e.diagnosis.film.recordings import Pair, read_pairs, read_recordings
 from adv2e.diagnosis.fitting.library import names
 from adv2e.diagnosis.known_light import read_known_light
 from adv2e.errors import UsageError, did_you_mean
+from adv2e.files.regular import shown
 from adv2e.options import DiagnoseOptions, EventInput, chosen, crop_of, size_of, takes
 from adv2e.process import bars
 from adv2e.reports.files import so_far, write_reports
@@ -29,7 +33,7 @@ if TYPE_CHECKING:
 
 @takes(DiagnoseOptions)
 def diagnose(
-    recording: str | Path,
+    recording: str | Path | Sequence[str | Path],
     declared: Written | Sequence[Written] | None = None,
     *,
     output: str | Path | None = None,
@@ -41,17 +45,17 @@ def diagnose(
 
     Parameters
     ----------
-    recording : str or Path
-        Frames and events on one clock: a DAVIS240C folder or zip, or HDF5.  With `light`, events
-        of any format.
+    recording : str or Path, or a sequence of them
+        Frames and events on one clock: a DAVIS240C folder or zip, or HDF5.  With `light` or
+        `film`, events of any format; with `film`, several of one camera.  With `films`, ().
     declared : Config, or what :func:`adv2e.load_config` takes, optional
         What is known of the camera.  A `sensor` must have the size of the recording.
     output : str or Path, optional
         Folder for report.html, report.json and model.yaml, which hold what is known so far until it
         is finished (:func:`adv2e.reports.files.so_far`).  Default: none is written.
     **options
-        See :class:`adv2e.options.DiagnoseOptions`, and :mod:`adv2e.diagnosis.known_light` for
-        `light`.
+        See :class:`adv2e.options.DiagnoseOptions`, :mod:`adv2e.diagnosis.known_light` for
+        `light`, and :mod:`adv2e.diagnosis.film` for `film` and `films`.
 
     Returns
     -------
@@ -72,8 +76,9 @@ def diagnose(
     ('explained', ['refractory'])
     >>> dead_time = load_config(found.model).pixel.refractory.period_us
     """
+    given = [recording] if isinstance(recording, (str, Path)) else recording
     return diagnose_file(
-        recording,
+        given,
         load_config(declared, size=size_of(options)),
         name=names_of(declared),
         written=written_keys(declared),
@@ -85,7 +90,7 @@ def diagnose(
 
 @takes(DiagnoseOptions)
 def diagnose_file(
-    recording: str | Path,
+    recordings: Sequence[str | Path],
     declared: Config,
     *,
     name: str,
@@ -112,30 +117,73 @@ def diagnose_file(
         if one in names():
             raise UsageError(f"--effect: {one}: a built-in effect has that name; choose another")
     declared = without_user_effects(declared, written)
-    inputs = [recording, *([] if light is None else [light]), *also_read]
+    pairs, seen = _pairs(recordings, options)
+    inputs = [*recordings, *seen, *also_read]
     kept = nullcontext() if output is None else so_far(output, overwrite=overwrite, inputs=inputs)
     with kept as known, _stages(options["progress"], say) as tell:
-        evidence = (
-            read_evidence(recording, declared.sensor, **reading)
-            if light is None
-            else read_known_light(recording, light, declared.sensor, **reading)
-        )
-        evidence = part_of(evidence, options["start_s"], options["stop_s"], crop_of(options))
-        found = diagnose_evidence(
-            evidence,
-            declared,
-            declared_name=name or "the defaults",
-            without=without,
-            free_thresholds=options["fit_thresholds"],
-            threads=options["threads"],
-            written=written,
-            progress=tell,
-            log=log,
-            known=known,
-        )
+        about: dict[str, Any] = {
+            "declared_name": name or "the defaults",
+            "without": without,
+            "free_thresholds": options["fit_thresholds"],
+            "written": written,
+            "log": log,
+            "known": known,
+        }
+        threads = options["threads"] or default_threads()
+        if pairs:
+            films = read_recordings(pairs, declared.sensor, **reading)
+            shown_as = recordings[0] if len(recordings) == 1 else options["films"] or pairs[0][0]
+            found = diagnose_films(
+                films, shown(shown_as), declared, threads=threads, progress=tell, **about
+            )
+        else:
+            evidence = (
+                read_evidence(recordings[0], declared.sensor, **reading)
+                if light is None
+                else read_known_light(recordings[0], light, declared.sensor, **reading)
+            )
+            evidence = part_of(evidence, options["start_s"], options["stop_s"], crop_of(options))
+            found = diagnose_evidence(evidence, declared, threads=threads, progress=tell, **about)
         if output is not None:
             write_reports(found, output, overwrite=overwrite)
     return found
+
+
+def _pairs(
+    recordings: Sequence[str | Path], options: DiagnoseOptions
+) -> tuple[list[Pair], list[str | Path]]:
+    """Return recordings with their films, none without films; and what else is read.
+
+    Raises
+    ------
+    UsageError
+        Options contradict one another, or there is no recording, or one too many.
+    DataError
+        As :func:`read_pairs` raises it.
+    """
+    light, film, films = options["light"], options["film"], options["films"]
+    given = {"--light": light, "--film": film, "--films": films}
+    named = [option for option, value in given.items() if value is not None]
+    if len(named) > 1:
+        raise UsageError(f"{' and '.join(named)}: give one of them, what the camera saw")
+    if film is None and films is None:
+        if len(recordings) != 1:
+            raise UsageError(
+                f"{len(recordings)} recordings are given: one is diagnosed, or with --film or"
+                " --films those of one camera before known pictures"
+            )
+        return [], [] if light is None else [light]
+    if any(options[name] is not None for name in ("start_s", "stop_s", "crop")):
+        raise UsageError(f"{named[0]}: leave --start, --stop and --crop out: all of it was seen")
+    if film is not None:
+        if not recordings:
+            raise UsageError("--film: give the recordings of events, too")
+        return [(one, film) for one in recordings], [film]
+    if recordings:
+        raise UsageError("--films: its table names the events: give no RECORDING")
+    assert films is not None
+    pairs = read_pairs(films)
+    return pairs, [films, *(name for pair in pairs for name in pair)]
 
 
 SAY_EVERY_S = 20.0

@@ -194,6 +194,7 @@ def _further(diagnosis: Diagnosis) -> dict[str, Any]:
         diagnosis.wording.subject: diagnosis.recording,
         "declared": diagnosis.declared,
         "declared_values": diagnosis.declared_values,
+        "view": [vars(one) for one in diagnosis.view],
         "errors": [
             {"name": row.name, **{role: vars(getattr(row, role)) for role in ROLES}}
             for row in diagnosis.errors

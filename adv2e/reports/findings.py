@@ -165,6 +165,18 @@ def nuisances(diagnosis: Diagnosis) -> Markup:
     return _keys("Keys that were not declared", values, diagnosis) if values else Markup()
 
 
+def view(diagnosis: Diagnosis) -> Markup:
+    """Return how the camera saw a known film, as it was fitted."""
+    columns = [Column("number"), Column("fitted", number=True), Column("sought", number=True)]
+    columns += [Column("unit"), Column("meaning")]
+    rows: list[list[object]] = [
+        [one.name, value_text(one.value), interval_text(one.bounds), one.unit, one.meaning]
+        for one in diagnosis.view
+        if not isinstance(one.value, list)
+    ]
+    return table("View of the film", columns, rows) if rows else Markup()
+
+
 def notes(texts: Sequence[str]) -> Markup:
     return tag("ul", *(tag("li", text) for text in texts)) if texts else Markup()
 

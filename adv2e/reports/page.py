@@ -31,6 +31,7 @@ def page(diagnosis: Diagnosis, folder: str | Path = ".") -> str:
         "What differs most": residual.groups(found),
         "Curves: measured and simulated": curves(found.curves, found.wording),
         "Values that were not declared and were fitted": findings.nuisances(found),
+        "View of the film, which was fitted": findings.view(found),
         "Notes": findings.notes(found.notes),
     }
     # those for paper are unfolded before printing

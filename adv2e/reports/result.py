@@ -42,6 +42,20 @@ class Finding:
 
 
 @dataclass(frozen=True)
+class SceneNumber:
+    """A number of the scene that was fitted, so that it is no knowledge of the scene.
+
+    `bounds`: between which it was sought; None: it is one of two.
+    """
+
+    name: str
+    value: Any
+    unit: str
+    meaning: str
+    bounds: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
 class Rejected:
     """An effect that was tried and not added, and why.
 
@@ -263,6 +277,8 @@ class Diagnosis:
         What the declared model holds of each key that was fitted, by path; None: it is off.
     defaults : collection of str
         Those of these keys that nobody wrote: the program's defaults stand for them.
+    view : list of SceneNumber
+        How the camera saw a known film, as fitted; none where frames or light are the scene.
     still : str
         What a diagnosis that is not finished is at.
     """
@@ -294,6 +310,7 @@ class Diagnosis:
     defaults: Collection[str] = ()
     totals: Sequence[Total] = ()
     snapshot: Snapshot | None = None
+    view: Sequence[SceneNumber] = ()
     still: str = ""
 
     @property

@@ -1,0 +1,347 @@
+"""Diagnosis of recordings of known films: the view is fitted, then what the camera lacks is found.
+
+Of many recordings before pictures, half are fitted to and half judge (:mod:`.selection`).  Of one
+recording of a video, the view is fitted, and the ordinary search looks at what is left, with the
+film's light in the place of frames.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adv2e import __version__
+from adv2e.config import Config
+from adv2e.diagnosis.configurations import (
+    as_found,
+    declared_of,
+    defaults_of,
+    of_frames_again,
+    of_known_light,
+    own_of,
+)
+from adv2e.diagnosis.data.evidence import Evidence
+from adv2e.diagnosis.data.scene import Placed, Scene
+from adv2e.diagnosis.data.splits import Stream
+from adv2e.diagnosis.diagnose import diagnose
+from adv2e.diagnosis.film.fitting import FilmFitter, Place
+from adv2e.diagnosis.film.nearness import DISTANCES, distances
+from adv2e.diagnosis.film.recordings import FilmRecordings, split
+from adv2e.diagnosis.film.registration import first_delays, first_view
+from adv2e.diagnosis.film.selection import FilmSearch, Step
+from adv2e.diagnosis.film.view import UNKNOWNS, Films, View
+from adv2e.diagnosis.fitting.candidates import NOTHING
+from adv2e.diagnosis.fitting.fitter import threshold_nuisance, thresholds_of
+from adv2e.diagnosis.fitting.library import OF_FRAMES, library
+from adv2e.diagnosis.hints.collect import Hints
+from adv2e.diagnosis.outcome.findings import finding_of
+from adv2e.diagnosis.outcome.picture import pictures_of
+from adv2e.effects import label_of
+from adv2e.reports.result import Diagnosis, ErrorRow, Estimate, SceneNumber, Verdict
+
+_NOT_TRIED = (*OF_FRAMES, "clock_offset", "clock_drift", "readout", "timestamp_tick")
+"""Effects that the view stands for, or that recordings side by side cannot show."""
+_DRAWS = 6
+_ROUNDS = 25
+_FIRST_DRAW = 100
+_PARTLY, _SURE = 0.8, 0.01
+_WHITE_DN = 255.0
+
+MISFIT = (
+    "misfit of the numbers of events in small parts of space and time, and of the times between"
+    " them, over that of chance"
+)
+
+
+def diagnose_films(
+    recordings: FilmRecordings, name: str, declared: Config, **options: Any
+) -> Diagnosis:
+    """Find the effects that a camera's declared model lacks, by what it saw.
+
+    `options` as of :func:`adv2e.diagnosis.diagnose.diagnose`; `name` is that of the recordings.
+
+    Raises
+    ------
+    ConfigError
+        The low-pass is not solved, but stepped from instant to instant.
+    """
+    if recordings.films.moves:
+        return _before_pictures(recordings, name, declared, **options)
+    return _before_a_video(recordings, name, declared, **options)
+
+
+def _before_a_video(
+    recordings: FilmRecordings,
+    name: str,
+    declared: Config,
+    *,
+    free_thresholds: bool,
+    threads: int,
+    progress: Callable[[str, int], None],
+    **options: Any,
+) -> Diagnosis:
+    """Fit the view of a video, and search as with frames."""
+    telling = _Telling(progress)
+    keys = threshold_nuisance(declared) if free_thresholds else NOTHING
+    fitter = FilmFitter(recordings.films, recordings.stream(), threads, telling.count)
+    telling.begin("fitting the view of the film")
+    base = of_known_light(declared)
+    start = first_view(recordings.films, fitter.measured)
+    place, _ = fitter.fitted(
+        Place(start, base, keys, np.array(keys.scaled(keys.starts[0]))), _ROUNDS
+    )
+    evidence = evidence_of(recordings.films, place.view, fitter.measured, name)
+    notes = [*recordings.notes, "the view of the film was fitted to all events of the recording"]
+    found = diagnose(
+        replace(evidence, notes=notes),
+        replace(declared, frames=place.config.frames, pixel=place.config.pixel),
+        free_thresholds=free_thresholds,
+        threads=threads,
+        progress=progress,
+        **options,
+    )
+    return replace(found, view=list(_fitted_view(place.view, recordings.films)))
+
+
+def _before_pictures(
+    recordings: FilmRecordings,
+    name: str,
+    declared: Config,
+    *,
+    declared_name: str,
+    without: Sequence[str],
+    written: Collection[str] | None,
+    free_thresholds: bool,
+    threads: int,
+    progress: Callable[[str, int], None],
+    log: Callable[[str], None],
+    known: Callable[[Diagnosis], None] | None,
+) -> Diagnosis:
+    """Fit views and effects to half of the recordings, and judge them by the others."""
+    began = time.perf_counter()
+    telling = _Telling(progress)
+    given, declared = declared, of_known_light(declared)
+    halves = [recordings.every_second(k) for k in (0, 1)]
+    fitter, judge = (FilmFitter(one.films, one.stream(), threads, telling.count) for one in halves)
+    delays_us = first_delays(recordings.stream(), len(recordings.events))
+    for k, one in enumerate((fitter, judge)):
+        one.shift_us(delays_us[k::2])
+    nuisances = threshold_nuisance(declared) if free_thresholds else NOTHING
+    search = FilmSearch(fitter, judge, nuisances, threads, log, telling.begin)
+    telling.begin("finding where the camera looked")
+    first = search.start(first_view(fitter.films, fitter.measured), declared)
+    free = {parameter.key for parameter in nuisances.parameters}
+    candidates = [
+        one
+        for one in library(declared, Hints(1.0, (), 1))
+        if one.name not in (*without, *_NOT_TRIED)
+        and one.parameters
+        and not free & {each.key for each in one.parameters}
+    ]
+
+    def told(steps: Sequence[Step], *, finished: bool) -> Diagnosis:
+        return _diagnosis(
+            steps,
+            search,
+            judge,
+            halves[1],
+            late_us=_interleaved(fitter.delays_us, judge.delays_us),
+            finished=finished,
+            recording=name,
+            declared=declared_name,
+            given=given,
+            written=written,
+            notes=[*recordings.notes, _about(recordings)],
+            facts={
+                "sensor": str(recordings.films.size),
+                "recordings": f"{len(recordings.events):,}",
+                "events": f"{sum(map(len, recordings.events)):,}",
+                "simulations": f"{telling.done:,}",
+                "seed": str(declared.seed),
+                "time taken": f"{time.perf_counter() - began:.0f} s",
+                "adv2e": __version__,
+            },
+        )
+
+    steps = [first]
+    if known is not None:
+        known(told(steps, finished=False))
+    for steps in search.steps(first, candidates):
+        if known is not None:
+            known(told(steps, finished=False))
+    telling.begin("judging on recordings not fitted to")
+    return told(steps, finished=True)
+
+
+class _Telling:
+    """Counts simulations, and tells of them and of stages."""
+
+    def __init__(self, progress: Callable[[str, int], None]) -> None:
+        self._progress, self._stage, self.done = progress, "", 0
+
+    def begin(self, stage: str) -> None:
+        self._stage = stage
+        self._progress(stage, self.done)
+
+    def count(self) -> None:
+        self.done += 1
+        self._progress(self._stage, self.done)
+
+
+def _about(recordings: FilmRecordings) -> str:
+    count = len(recordings.events)
+    return (
+        f"{count - count // 2} of {count} recordings were fitted to, the others judge; what is"
+        " fitted of the view is no knowledge: black and grey curve go together with the thresholds"
+    )
+
+
+def _diagnosis(
+    steps: Sequence[Step],
+    search: FilmSearch,
+    judge: FilmFitter,
+    half: FilmRecordings,
+    *,
+    late_us: NDArray[np.float64],
+    finished: bool,
+    given: Config,
+    written: Collection[str] | None,
+    **about: Any,
+) -> Diagnosis:
+    first, last = steps[0], steps[-1]
+    verdict, remark = _verdict(first, last)
+    config = last.place.config
+    count = len(half.events)
+    pixels = count * half.films.size.width * half.films.size.height
+    effects = [finding_of(fit, pixels, config) for fit in search.fits(last)]
+    nuisances = thresholds_of(config) if search.has_nuisances else {}
+    keys = (key for one in effects for key in one.parameters)
+    held = declared_of(given, [*nuisances, *keys])
+    streams = [
+        judge.streams(step.place.view, step.place.config, range(_FIRST_DRAW, _FIRST_DRAW + _DRAWS))
+        for step in (first, last)
+    ]
+    if not finished:
+        remark = f"So far: {remark} All of this may still change."
+    return Diagnosis(
+        verdict=verdict if finished else "unfinished",
+        remark=remark,
+        still="" if finished else "searching for what is missing",
+        effects=effects,
+        nuisances=nuisances,
+        rejected=list(search.rejected.values()),
+        errors=_errors(steps, streams, half, judge),
+        global_p_before=first.probability,
+        global_p_after=last.probability,
+        split="every second recording is fitted to, from the first; the others judge",
+        model=as_found(of_frames_again(config, given)),
+        own=own_of(config),
+        declared_values=held,
+        defaults=defaults_of(held, written),
+        view=[*_fitted_view(last.place.view, half.films), _late(late_us)],
+        **_pictures(last, judge, streams),
+        **about,
+    )
+
+
+def _verdict(first: Step, last: Step) -> tuple[Verdict, str]:
+    if not last.effects:
+        if first.probability >= _SURE:
+            return "consistent", "The recordings are what the declared model makes."
+        return (
+            "unexplained",
+            "No effect of the library brings the simulation nearer to recordings that were not"
+            " fitted to: the rest may be the view, or an effect that is not in the library.",
+        )
+    share = 1.0 - last.error / first.error
+    if last.probability >= _SURE:
+        return "explained", "With this change nothing is left that these recordings show."
+    names = " and ".join(label_of(one.name) for one in last.effects)
+    if share >= _PARTLY:
+        return (
+            "partly_explained",
+            f"This explains {share:.0%} of the difference; something is left, which may be the"
+            " view: use the model found, but know what still differs.",
+        )
+    return (
+        "unexplained",
+        f"{names[:1].upper()}{names[1:]} brings the simulation nearer to recordings that were not"
+        f" fitted to, and explains {share:.0%} of the difference: too little to be all. The rest"
+        " may be the view, or an effect that is not in the library.",
+    )
+
+
+def _errors(
+    steps: Sequence[Step],
+    streams: Sequence[Sequence[Stream]],
+    half: FilmRecordings,
+    judge: FilmFitter,
+) -> list[ErrorRow]:
+    size, span, count = half.films.size, half.span_us, len(half.events)
+    inside = split(judge.measured, count)
+    made = [[split(stream, count) for stream in side] for side in streams]
+    found = [[distances(inside, one, size, span) for one in side] for side in made]
+    floor = [distances(a, b, size, span) for a, b in zip(made[1][:-1], made[1][1:], strict=True)]
+    first, last = steps[0], steps[-1]
+    chance = Estimate(1.0)
+    rows = [ErrorRow(MISFIT, Estimate(first.error + 1.0), Estimate(last.error + 1.0), chance)]
+    for name in DISTANCES:
+        before, after, between = (
+            Estimate.of_draws([one[name] for one in side]) for side in (*found, floor)
+        )
+        rows.append(ErrorRow(name, before, after, between))
+    return rows
+
+
+def _pictures(last: Step, judge: FilmFitter, streams: Sequence[Sequence[Stream]]) -> dict[str, Any]:
+    evidence = evidence_of(judge.films, last.place.view, judge.measured, "")
+    scene = Scene.of_evidence(evidence, last.place.config)
+    measured = Placed.of(evidence.stream, scene)
+    before, after = ([Placed.of(one, scene) for one in side] for side in streams)
+    return pictures_of(scene, measured, before, after)
+
+
+def evidence_of(films: Films, view: View, stream: Stream, name: str) -> Evidence:
+    """Return recordings of films with the light that a view gives them, as frames."""
+    times_s = films.times_ns * 1e-9
+    light: NDArray[np.float32] = films.light(view)
+    return Evidence(
+        name=name,
+        frames=list(light),
+        times_s=np.asarray(times_s, np.float64),
+        stream=stream.between(times_s[0] * 1e6, times_s[-1] * 1e6),
+        width=light.shape[2],
+        height=light.shape[1],
+        white=_WHITE_DN,
+    )
+
+
+def _interleaved(even: NDArray[np.float64], odd: NDArray[np.float64]) -> NDArray[np.float64]:
+    every = np.empty(len(even) + len(odd))
+    every[::2], every[1::2] = even, odd
+    return every
+
+
+def _late(late_us: NDArray[np.float64]) -> SceneNumber:
+    meaning = "by how much each recording began later on the path than the middle one"
+    return SceneNumber("late_ms", (late_us * 1e-3).round(2).tolist(), "ms", meaning, None)
+
+
+def _fitted_view(view: View, films: Films) -> Iterator[SceneNumber]:
+    yield SceneNumber("inverted", view.inverted, "", "what is bright in the film was dark", None)
+    for one in UNKNOWNS:
+        value = getattr(view, one.name)
+        yield SceneNumber(one.name, value, one.unit, one.meaning, (one.low, one.high))
+    reach = films.reach_px
+    times_ms = films.times_ns * 1e-6
+    path = films.positions(view)
+    every = slice(None, None, max(1, math.ceil(len(path) / 40)) if films.moves else len(path))
+    rows = np.column_stack([times_ms, path])[every].round(3).tolist()
+    meaning = "time [ms], then columns and rows from the film's middle to what the sensor's sees"
+    yield SceneNumber("path", rows, "px", meaning, (-reach, reach))
