@@ -68,6 +68,8 @@ class Command(click.Command):
         """Parse the arguments; raise UsageError, with what to type instead, if some are left."""
         given = list(args)
         extra = super().parse_args(ctx, args)
+        if not ctx.params.get("film"):  # with it, a diagnosis takes several recordings
+            extra = [*extra, *ctx.params.get("recordings", ())[1:]]
         if extra and not ctx.resilient_parsing:
             raise UsageError(_hint(ctx, given, extra))
         return extra
@@ -77,7 +79,9 @@ def _hint(ctx: click.Context, given: Sequence[str], extra: Sequence[str]) -> str
     """Return a hint for the arguments `given`, of which `extra` are too many: a line to type."""
     arguments = [item for item in ctx.command.params if isinstance(item, click.Argument)]
     typed, _, _ = ctx.command.make_parser(ctx).parse_args(list(given))
-    taken = [typed[item.name] for item in arguments]
+    values = [typed[item.name] for item in arguments]
+    # of an argument that may be repeated, the first
+    taken = [value[0] if isinstance(value, tuple) else value for value in values if value]
     has_output = ctx.get_parameter_source("output") is ParameterSource.COMMANDLINE
     is_output = len(extra) == 1 and "output" in ctx.params and not has_output
     if is_output and not (taken and _is_another(extra[0], taken[0])):
@@ -90,8 +94,12 @@ def _hint(ctx: click.Context, given: Sequence[str], extra: Sequence[str]) -> str
             options.append('-o "$f.mp4"')
         body = " ".join([ctx.command_path, '"$f"', *options])
         loop = f"for f in {_pattern([*taken, *extra])}; do {body}; done"
-        return f"{ctx.info_name} takes one {arguments[0].metavar} at a time; for several: {loop}"
+        return f"{ctx.info_name} takes one {_name(arguments[0])} at a time; for several: {loop}"
     return f"unexpected argument '{extra[0]}': {' '.join(ctx.command.get_usage(ctx).split()[1:])}"
+
+
+def _name(argument: click.Argument) -> str:
+    return str(argument.metavar).removesuffix("...")
 
 
 def _is_another(path: str, first: str) -> bool:

@@ -50,7 +50,10 @@ def offered(adv2e, monkeypatch):
         ("adv2e convert --layout ", registry.layouts()),
         (
             "adv2e convert --set pixel.hot",
-            [f"pixel.hot_pixels.{name}=" for name in ("fraction", "rate_hz", "spread")],
+            [
+                f"pixel.hot_pixels.{name}="
+                for name in ("fraction", "off_fraction", "rate_hz", "spread")
+            ],
         ),
         ("adv2e effects ", [name for item in EFFECTS for name in (item.name, *item.told_as)]),
         ("adv2e effects refr", ["refractory"]),

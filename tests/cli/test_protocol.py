@@ -46,7 +46,7 @@ def test_its_command_and_its_configuration_are_read(tmp_path):
     (line,) = re.findall(r"^  adv2e diagnose (.*)$", TEXT, re.MULTILINE)
     given = diagnose.make_parser(diagnose.make_context("diagnose", ["a"], resilient_parsing=True))
     options, arguments, _ = given.parse_args(shlex.split(line))
-    assert arguments == ["led.raw"] or options["recording"] == "led.raw"
+    assert arguments == ["led.raw"] or options["recordings"] == ("led.raw",)
     assert options["light"] == "stimulus.csv"
     (text,) = re.findall(r"'(pixel: .*?)'", TEXT)
     (tmp_path / "declared.yaml").write_text(text, "ascii")

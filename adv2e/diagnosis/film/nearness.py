@@ -17,12 +17,14 @@ Array = NDArray[np.float64]
 _BINS = 32
 _GAPS_US = 10.0 ** np.arange(0.0, 6.01, 0.25)
 
+TOTALS = "all events: ln(simulated / measured), without its sign"
+CORRELATION = "one less the correlation of the recordings' numbers of events"
 SPREAD = "spread over recordings of ln(events simulated / measured)"
 COURSE = "mean course in time, in 32 parts: sum of the differences of shares"
 GAPS = "times between events of a pixel, by quarters of decades: sum of the differences of shares"
 MAPS = "one less the mean correlation of count maps"
 TOLD = "accuracy of a linear classifier that tells simulated from measured (0.5: it cannot)"
-DISTANCES = (SPREAD, COURSE, GAPS, MAPS, TOLD)
+DISTANCES = (TOTALS, SPREAD, CORRELATION, COURSE, GAPS, MAPS, TOLD)
 """Names of the distances that :func:`distances` returns: the less, the nearer."""
 
 
@@ -48,7 +50,12 @@ def distances(
     pairs = list(zip(measured, simulated, strict=True))
     ratios = [np.log((len(b) + 0.5) / (len(a) + 0.5)) for a, b in pairs]
     alike = [float(np.corrcoef(maps(a), maps(b))[0, 1]) for a, b in pairs]
-    found = [np.std(ratios)]
+    counts = np.array([(len(a), len(b)) for a, b in pairs], np.float64).T
+    found = [np.abs(np.log((counts[1].sum() + 0.5) / (counts[0].sum() + 0.5))), np.std(ratios)]
+    apart = counts - counts.mean(axis=1, keepdims=True)
+    scale = np.sqrt((apart**2).sum(axis=1).prod())
+    # numbers that are all alike do not go together, nor against one another
+    found += [1.0 - float(apart[0] @ apart[1] / scale) if scale else 1.0]
     found += [np.abs(np.subtract(*shares(of))).sum() for of in (course, gaps)]
     found += [1.0 - np.mean(alike), accuracy(samples(measured, simulated, size, span))]
     return dict(zip(DISTANCES, map(float, found), strict=True))

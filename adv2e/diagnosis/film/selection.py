@@ -98,7 +98,18 @@ class FilmSearch:
         self._begin("fitting the view of the film")
         keys = self._nuisances
         self._first_view = view
-        best, _ = self._from_anew(Place(view, declared, keys, _first(keys)))
+        begun = [
+            self._fitter.fitted(
+                Place(replace(view, black=black), declared, keys, _first(keys)),
+                _ROUNDS,
+                path=False,
+            )[0]
+            for black in _BLACKS
+        ]
+        ends = [self._fitter.fitted(place, _LAST_ROUNDS) for place in begun]
+        for _, misfit in ends:
+            self._log(f"  a fit of the view ended at {misfit:,.0f}")
+        best, _ = min(ends, key=lambda end: end[1])
         self._fitter.align(best)
         best, _ = self._fitter.fitted(best, _LAST_ROUNDS)
         return self._aligned(best, ())

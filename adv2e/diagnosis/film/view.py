@@ -74,7 +74,7 @@ UNKNOWNS = (
         0.25,
     ),
     Unknown("black", "", "light of black, as a share of white", 1e-3, 0.9, True, 0.25),
-    Unknown("gamma", "", "exponent of the screen's grey curve", 0.25, 4.0, True, 0.15),
+    Unknown("gamma", "", "exponent of the screen's grey curve", 0.4, 3.0, True, 0.15),
 )
 """Numbers of a :class:`View` that are fitted besides its path."""
 
@@ -175,10 +175,12 @@ class Films:
         shown = 1.0 - picture if view.inverted else picture
         fine = self.fine
         border = math.ceil(self.reach_px * self.film_px + 4 * view.blur_px * self.film_px)
-        padded = cv2.copyMakeBorder(shown**view.gamma, *(border,) * 4, cv2.BORDER_REPLICATE)
+        padded = cv2.copyMakeBorder(shown, *(border,) * 4, cv2.BORDER_REPLICATE)
         rows, columns = padded.shape
-        large = cv2.resize(padded, (columns * fine, rows * fine), interpolation=cv2.INTER_CUBIC)
-        large = np.clip(large, 0.0, 1.0)
+        # a screen puts a line between the numbers of a picture; a video's are samples of a scene
+        between = cv2.INTER_LINEAR if self.moves else cv2.INTER_CUBIC
+        large = cv2.resize(padded, (columns * fine, rows * fine), interpolation=between)
+        large = np.clip(large, 0.0, 1.0) ** view.gamma
         sd = view.blur_px * self.film_px * fine
         soft = cv2.GaussianBlur(large, (0, 0), sd, borderType=cv2.BORDER_REPLICATE)
         return np.asarray(view.black + (1.0 - view.black) * soft, np.float32)

@@ -124,7 +124,8 @@ def test_a_dead_time_is_found_behind_a_view_that_nobody_knows(adv2e, tmp_path, r
     assert view["scale"] == pytest.approx(1.0, abs=0.05)
     assert view["turn_rad"] == pytest.approx(0.0, abs=0.04)
     assert BLACK / 3 < view["black"] < 3 * BLACK
-    assert view["blur_px"] == pytest.approx(BLUR_PX, abs=0.2)
+    # a line between the numbers of a picture blurs it by 0.41 px
+    assert np.hypot(view["blur_px"], 0.41) == pytest.approx(BLUR_PX, abs=0.2)
     # nothing tells where the camera looked before and after it moved but what then came
     moving = np.array([row for row in view["path"] if 80.0 < row[0] < 180.0])
     late_ms = np.array(view["late_ms"])
@@ -231,8 +232,8 @@ def test_numbers_are_those_of_a_slow_count():
 
 
 def test_recordings_of_one_law_are_near_and_thinned_ones_are_not():
-    measured = [_events(k, 1500) for k in range(20)]
-    alike = [_events(100 + k, 1500) for k in range(20)]
+    measured = [_events(k, 1400 + 10 * k) for k in range(20)]
+    alike = [_events(100 + k, 1400 + 10 * k) for k in range(20)]
     fewer = [one[::2] for one in alike]
     size, span = Size(10, 10), (0, 200_000)
     near, far = (distances(measured, other, size, span) for other in (alike, fewer))
@@ -262,7 +263,8 @@ def test_a_table_of_films_that_is_none(tmp_path, text, wrong):
 @pytest.mark.parametrize(
     ("arguments", "wrong"),
     [
-        (["a.h5", "b.h5"], "2 recordings are given"),
+        (["a.h5", "b.h5"], "takes one RECORDING at a time"),
+        (["a.h5", "b.h5", "--films", "a.csv"], "takes one RECORDING at a time"),
         ([], "0 recordings are given"),
         (["a.h5", "--film", "a.png", "--light", "b.csv"], "--light and --film: give one of them"),
         (["--film", "a.png"], "--film: give the recordings"),
