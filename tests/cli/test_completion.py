@@ -52,7 +52,7 @@ def offered(adv2e, monkeypatch):
             "adv2e convert --set pixel.hot",
             [
                 f"pixel.hot_pixels.{name}="
-                for name in ("fraction", "off_fraction", "rate_hz", "spread")
+                for name in ("fraction", "rate_hz", "spread", "off_fraction")
             ],
         ),
         ("adv2e effects ", [name for item in EFFECTS for name in (item.name, *item.told_as)]),
