@@ -30,10 +30,10 @@ from adv2e import load_config
 from adv2e.background import default_threads
 from adv2e.config.model import Sensor
 from adv2e.diagnosis.configurations import of_known_light
-from adv2e.diagnosis.film.fitting import FilmFitter
+from adv2e.diagnosis.film.diagnose import halves_of
 from adv2e.diagnosis.film.nearness import DISTANCES, distances
 from adv2e.diagnosis.film.recordings import FilmRecordings, Pair, read_recordings, split
-from adv2e.diagnosis.film.registration import first_delays, first_view
+from adv2e.diagnosis.film.registration import first_view
 from adv2e.diagnosis.film.selection import FilmSearch
 from adv2e.diagnosis.fitting.fitter import threshold_nuisance
 from adv2e.events import Events
@@ -55,14 +55,8 @@ class Halves:
     """Recordings to fit to, and those to judge by, all on one clock."""
 
     def __init__(self, recordings: FilmRecordings, threads: int) -> None:
-        self.threads, self.recordings = threads, recordings
-        late_us = first_delays(recordings.stream(), len(recordings.events))
-        self.fitters = []
-        for k in (0, 1):
-            half = recordings.every_second(k)
-            fitter = FilmFitter(half.films, half.stream(), threads)
-            fitter.shift_us(late_us[k::2])
-            self.fitters.append(fitter)
+        self.threads, self.films = threads, recordings.films
+        self.fitters = halves_of(recordings, threads)
 
     def judged(self, name: str) -> tuple[list[dict[str, float]], list[list[Events]], str]:
         """Return distances of a configuration, its simulations, and its fitted thresholds."""
@@ -86,7 +80,7 @@ class Halves:
 
     def apart(self, one: Sequence[Events], other: Sequence[Events]) -> dict[str, float]:
         """Return the distances of two sets of recordings of the same pictures."""
-        return distances(one, other, self.recordings.films.size, self.recordings.span_us)
+        return distances(one, other, self.films.size, self.films.span_us)
 
 
 def drawn(rows: Sequence[Sequence[Events]], size: Size) -> NDArray[np.uint8]:

@@ -30,7 +30,7 @@ from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.data.scene import Placed, Scene
 from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.diagnose import diagnose
-from adv2e.diagnosis.film.fitting import FilmFitter, Place
+from adv2e.diagnosis.film.fitting import FilmFitter, Place, first_point
 from adv2e.diagnosis.film.nearness import DISTANCES, distances
 from adv2e.diagnosis.film.recordings import FilmRecordings, split
 from adv2e.diagnosis.film.registration import first_delays, first_view
@@ -93,9 +93,7 @@ def _before_a_video(
     telling.begin("fitting the view of the film")
     base = of_known_light(declared)
     start = first_view(recordings.films, fitter.measured)
-    place, _ = fitter.fitted(
-        Place(start, base, keys, np.array(keys.scaled(keys.starts[0]))), _ROUNDS
-    )
+    place, _ = fitter.fitted(Place(start, base, keys, first_point(keys)), _ROUNDS)
     evidence = evidence_of(recordings.films, place.view, fitter.measured, name)
     notes = [*recordings.notes, "the view of the film was fitted to all events of the recording"]
     found = diagnose(
@@ -127,11 +125,7 @@ def _before_pictures(
     began = time.perf_counter()
     telling = _Telling(progress)
     given, declared = declared, of_known_light(declared)
-    halves = [recordings.every_second(k) for k in (0, 1)]
-    fitter, judge = (FilmFitter(one.films, one.stream(), threads, telling.count) for one in halves)
-    delays_us = first_delays(recordings.stream(), len(recordings.events))
-    for k, one in enumerate((fitter, judge)):
-        one.shift_us(delays_us[k::2])
+    fitter, judge = halves_of(recordings, threads, telling.count)
     nuisances = threshold_nuisance(declared) if free_thresholds else NOTHING
     search = FilmSearch(fitter, judge, nuisances, threads, log, telling.begin)
     telling.begin("finding where the camera looked")
@@ -145,38 +139,60 @@ def _before_pictures(
         and not free & {each.key for each in one.parameters}
     ]
 
-    def told(steps: Sequence[Step], *, finished: bool) -> Diagnosis:
-        return _diagnosis(
+    def facts() -> dict[str, str]:
+        return {
+            "sensor": str(recordings.films.size),
+            "recordings": f"{len(recordings.events):,}",
+            "events": f"{sum(map(len, recordings.events)):,}",
+            "simulations": f"{telling.done:,}",
+            "seed": str(declared.seed),
+            "time taken": f"{time.perf_counter() - began:.0f} s",
+            "adv2e": __version__,
+        }
+
+    def told(steps: Sequence[Step]) -> Diagnosis:
+        """Return what is found so far, and tell of it."""
+        found = _diagnosis(
             steps,
             search,
             judge,
-            halves[1],
             late_us=_interleaved(fitter.delays_us, judge.delays_us),
-            finished=finished,
             recording=name,
             declared=declared_name,
             given=given,
             written=written,
             notes=[*recordings.notes, _about(recordings)],
-            facts={
-                "sensor": str(recordings.films.size),
-                "recordings": f"{len(recordings.events):,}",
-                "events": f"{sum(map(len, recordings.events)):,}",
-                "simulations": f"{telling.done:,}",
-                "seed": str(declared.seed),
-                "time taken": f"{time.perf_counter() - began:.0f} s",
-                "adv2e": __version__,
-            },
         )
-
-    steps = [first]
-    if known is not None:
-        known(told(steps, finished=False))
-    for steps in search.steps(first, candidates):
         if known is not None:
-            known(told(steps, finished=False))
-    telling.begin("judging on recordings not fitted to")
-    return told(steps, finished=True)
+            known(
+                replace(
+                    found,
+                    verdict="unfinished",
+                    remark=f"So far: {found.remark} All of this may still change.",
+                    still="searching for what is missing",
+                    facts=facts(),
+                )
+            )
+        return found
+
+    found = told([first])
+    for steps in search.steps(first, candidates):
+        found = told(steps)
+    return replace(found, rejected=list(search.rejected.values()), facts=facts())
+
+
+def halves_of(
+    recordings: FilmRecordings, threads: int, count: Callable[[], None] = lambda: None
+) -> tuple[FilmFitter, FilmFitter]:
+    """Return fitters of the recordings that are fitted to and of those that judge, on one clock."""
+    delays_us = first_delays(recordings.stream(), len(recordings.events))
+    fitters = []
+    for k in (0, 1):
+        half = recordings.every_second(k)
+        fitter = FilmFitter(half.films, half.stream(), threads, count)
+        fitter.shift_us(delays_us[k::2])
+        fitters.append(fitter)
+    return fitters[0], fitters[1]
 
 
 class _Telling:
@@ -206,19 +222,16 @@ def _diagnosis(
     steps: Sequence[Step],
     search: FilmSearch,
     judge: FilmFitter,
-    half: FilmRecordings,
     *,
     late_us: NDArray[np.float64],
-    finished: bool,
     given: Config,
     written: Collection[str] | None,
     **about: Any,
 ) -> Diagnosis:
     first, last = steps[0], steps[-1]
     verdict, remark = _verdict(first, last)
-    config = last.place.config
-    count = len(half.events)
-    pixels = count * half.films.size.width * half.films.size.height
+    config, films = last.place.config, judge.films
+    pixels = len(films.pictures) * films.size.width * films.size.height
     effects = [finding_of(fit, pixels, config) for fit in search.fits(last)]
     nuisances = thresholds_of(config) if search.has_nuisances else {}
     keys = (key for one in effects for key in one.parameters)
@@ -227,16 +240,13 @@ def _diagnosis(
         judge.streams(step.place.view, step.place.config, range(_FIRST_DRAW, _FIRST_DRAW + _DRAWS))
         for step in (first, last)
     ]
-    if not finished:
-        remark = f"So far: {remark} All of this may still change."
     return Diagnosis(
-        verdict=verdict if finished else "unfinished",
+        verdict=verdict,
         remark=remark,
-        still="" if finished else "searching for what is missing",
         effects=effects,
         nuisances=nuisances,
         rejected=list(search.rejected.values()),
-        errors=_errors(steps, streams, half, judge),
+        errors=_errors(first, last, streams, judge),
         global_p_before=first.probability,
         global_p_after=last.probability,
         split="every second recording is fitted to, from the first; the others judge",
@@ -244,7 +254,7 @@ def _diagnosis(
         own=own_of(config),
         declared_values=held,
         defaults=defaults_of(held, written),
-        view=[*_fitted_view(last.place.view, half.films), _late(late_us)],
+        view=[*_fitted_view(last.place.view, films), _late(late_us)],
         **_pictures(last, judge, streams),
         **about,
     )
@@ -278,17 +288,14 @@ def _verdict(first: Step, last: Step) -> tuple[Verdict, str]:
 
 
 def _errors(
-    steps: Sequence[Step],
-    streams: Sequence[Sequence[Stream]],
-    half: FilmRecordings,
-    judge: FilmFitter,
+    first: Step, last: Step, streams: Sequence[Sequence[Stream]], judge: FilmFitter
 ) -> list[ErrorRow]:
-    size, span, count = half.films.size, half.span_us, len(half.events)
+    films = judge.films
+    size, span, count = films.size, films.span_us, len(films.pictures)
     inside = split(judge.measured, count)
     made = [[split(stream, count) for stream in side] for side in streams]
     found = [[distances(inside, one, size, span) for one in side] for side in made]
     floor = [distances(a, b, size, span) for a, b in zip(made[1][:-1], made[1][1:], strict=True)]
-    first, last = steps[0], steps[-1]
     chance = Estimate(1.0)
     rows = [ErrorRow(MISFIT, Estimate(first.error + 1.0), Estimate(last.error + 1.0), chance)]
     for name in DISTANCES:

@@ -62,6 +62,11 @@ class Place:
         return self.keys.applied(self.base, self.point)
 
 
+def first_point(keys: Candidate) -> Array:
+    """Return the point of the first start of some keys, on their scales."""
+    return np.array(keys.scaled(keys.starts[0]))
+
+
 class FilmFitter:
     """Simulates recordings of films, and fits views and cameras to them.
 

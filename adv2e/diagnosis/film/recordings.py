@@ -51,11 +51,6 @@ class FilmRecordings:
     events: Sequence[Events]
     notes: list[str]
 
-    @property
-    def span_us(self) -> tuple[int, int]:
-        first, last = (self.films.times_ns[[0, -1]] // 1000).tolist()
-        return int(first), int(last)
-
     def stream(self) -> Stream:
         """Return the events of all recordings, side by side on one wide sensor."""
         width, height = self.films.size

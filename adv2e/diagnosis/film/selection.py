@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config import Config
-from adv2e.diagnosis.film.fitting import FilmFitter, Place
+from adv2e.diagnosis.film.fitting import FilmFitter, Place, first_point
 from adv2e.diagnosis.film.view import View
 from adv2e.diagnosis.fitting.candidates import Candidate
 from adv2e.diagnosis.fitting.fitted import Fitted
@@ -96,17 +96,9 @@ class FilmSearch:
     def start(self, view: View, declared: Config) -> Step:
         """Return the declared model with its view fitted, and the keys that are not known."""
         self._begin("fitting the view of the film")
-        keys = self._nuisances
         self._first_view = view
-        begun = [
-            self._fitter.fitted(
-                Place(replace(view, black=black), declared, keys, _first(keys)),
-                _ROUNDS,
-                path=False,
-            )[0]
-            for black in _BLACKS
-        ]
-        ends = [self._fitter.fitted(place, _LAST_ROUNDS) for place in begun]
+        begun = self._begun(Place(view, declared, self._nuisances, first_point(self._nuisances)))
+        ends = [self._fitter.fitted(place, _LAST_ROUNDS) for place, _ in begun]
         for _, misfit in ends:
             self._log(f"  a fit of the view ended at {misfit:,.0f}")
         best, _ = min(ends, key=lambda end: end[1])
@@ -182,11 +174,13 @@ class FilmSearch:
 
         A view that was fitted without an effect has taken a part of it, and keeps that.
         """
+        best, _ = min(self._begun(place), key=lambda end: end[1])
+        return self._fitter.fitted(best, _LAST_ROUNDS)
+
+    def _begun(self, place: Place) -> list[tuple[Place, float]]:
+        """Return fits of a place along the first path, one for each black level of the start."""
         views = [replace(self._first_view, black=black) for black in _BLACKS]
-        begun = [
-            self._fitter.fitted(replace(place, view=one), _ROUNDS, path=False) for one in views
-        ]
-        return self._fitter.fitted(min(begun, key=lambda end: end[1])[0], _LAST_ROUNDS)
+        return [self._fitter.fitted(replace(place, view=one), _ROUNDS, path=False) for one in views]
 
     def _aligned(self, place: Place, effects: tuple[Candidate, ...]) -> Step:
         """Return a model as a step, after all recordings have moved in time to where it is best."""
@@ -200,10 +194,8 @@ class FilmSearch:
     def _with(self, step: Step, one: Candidate, start: Sequence[float]) -> Place:
         """Return the place of a step with an effect more, where its fit begins."""
         place = step.place
-        before = replace(place.keys, starts=((),))
-        keys = Candidate.joined([replace(before, starts=(tuple(_values(place)),)), one])
-        point = np.concatenate([place.point, one.scaled(start)])
-        return Place(place.view, place.base, replace(keys, name=one.name), point)
+        keys = Candidate.joined([place.keys, one])
+        return replace(place, keys=keys, point=np.concatenate([place.point, one.scaled(start)]))
 
     def _rough(self, place: Place) -> float:
         first, second = self._fitter.residual(place.view, place.config)
@@ -243,14 +235,6 @@ def _sureness(gain: Array) -> float:
     t = float(gain.mean() / (gain.std(ddof=1) / np.sqrt(len(gain)) + 1e-12))
     normal = (8 * free + 1) / (8 * free + 3) * math.sqrt(free * math.log1p(t * t / free))
     return math.copysign(normal, t)
-
-
-def _first(keys: Candidate) -> Array:
-    return np.array(keys.scaled(keys.starts[0]))
-
-
-def _values(place: Place) -> list[float]:
-    return [one.value_at(at) for one, at in zip(place.keys.parameters, place.point, strict=True)]
 
 
 def _own(place: Place, one: Candidate) -> Array:

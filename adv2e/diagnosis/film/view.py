@@ -130,6 +130,11 @@ class Films:
         return len(self.pictures[0]) == 1
 
     @property
+    def span_us(self) -> tuple[int, int]:
+        first, last = (self.times_ns[[0, -1]] // 1000).tolist()
+        return int(first), int(last)
+
+    @property
     def reach_px(self) -> float:
         """Farthest that a path may leave the middle [px of the sensor]."""
         return _FARTHEST * min(self.size)
