@@ -203,10 +203,17 @@ class _Descent:
         here = self._fitter.residual(place.view, place.config)
         normal, _ = self._slope(place, here, self._columns(place, here))
         scale = 1.0 / np.sqrt(np.abs(np.diag(normal)) + 1e-6)
-        inverse = np.linalg.pinv(normal * np.outer(scale, scale), _TOLD, hermitian=True)
+        values, vectors = np.linalg.eigh(normal * np.outer(scale, scale))
+        told = values > _TOLD
+        inverse = (vectors[:, told] / values[told]) @ vectors[:, told].T
         first = len(self._free)
         own = slice(first, first + len(place.keys.parameters))
-        return np.asarray(_VARIANCE * (inverse * np.outer(scale, scale))[own, own])
+        found = _VARIANCE * (inverse * np.outer(scale, scale))[own, own]
+        # what lies mostly in directions that the data do not tell may be anything
+        untold = (vectors[own][:, ~told] ** 2).sum(axis=1) > 0.5
+        found[untold, :] = found[:, untold] = 0.0
+        found[untold, untold] = np.inf
+        return np.asarray(found)
 
     def _misfit(self, place: Place, here: list[Numbers]) -> float:
         return here[0].times(here[1]) + float(np.sum((_bend(place.view) / _BEND_PX) ** 2))

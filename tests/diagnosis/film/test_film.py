@@ -13,14 +13,19 @@ import pytest
 from camera import Camera, patchwork
 from camera.scene import AnyScene, View
 
+from adv2e import load_config
 from adv2e.diagnosis.data.splits import Stream
+from adv2e.diagnosis.film.fitting import FilmFitter, Place, first_point
 from adv2e.diagnosis.film.nearness import DISTANCES, TOLD, distances
 from adv2e.diagnosis.film.recordings import read_pairs, read_recordings, split
 from adv2e.diagnosis.film.registration import first_delays, first_view
 from adv2e.diagnosis.film.residual import Counting
 from adv2e.diagnosis.film.view import STEP_NS, Films
 from adv2e.diagnosis.film.view import View as FilmView
+from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
+from adv2e.diagnosis.fitting.fitted import Fitted
 from adv2e.diagnosis.fitting.library import names
+from adv2e.diagnosis.outcome.findings import finding_of
 from adv2e.errors import DataError
 from adv2e.events import EVENT_DTYPE
 from adv2e.geometry import Size
@@ -300,3 +305,17 @@ def test_a_video_is_seen_where_it_was_shifted_to(adv2e, tmp_path):
     assert view["inverted"] is False
     assert view["scale"] == pytest.approx(1.0, abs=0.02)
     assert found["effects"] == []
+
+
+def test_a_number_that_the_recordings_do_not_tell_may_be_anything(recorded):
+    recordings = read_recordings(read_pairs(recorded({}, 4, inverted=False)))
+    fitter = FilmFitter(recordings.films, recordings.stream(), 1)
+    # no event is within so short a time of another, so none is lost
+    key = FitParameter("pixel.refractory.period_us", 1e-3, 1e6)
+    keys = Candidate("refractory", (key,), ((1e-3,),))
+    declared = load_config(["ideal"], ["pixel.refractory.period_us=0.001", "sampling.L=1"])
+    place = Place(first_view(recordings.films, fitter.measured), declared, keys, first_point(keys))
+    ((variance,),) = fitter.covariance(place, 1.0)
+    assert np.isinf(variance)
+    fit = Fitted(keys, declared, place.point, covariance=np.array([[variance]]))
+    assert finding_of(fit, 1, declared).interval[key.key] == (1e-3, 1e6)
