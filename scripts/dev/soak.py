@@ -44,8 +44,8 @@ _END_S = 20.0
 
 _HANGS_S = 300.0
 
-_PYTHON_BEGINS = 'File "<frozen site>"'
-"""In the traceback of a Python that a signal ends before it has come to the program."""
+_PYTHON_BEGINS = ('File "<frozen site>"', "Could not import runpy module")
+"""Told by a Python that a signal ends before it has come to the program."""
 
 _SIZES = ((32, 24), (64, 48), (97, 61), (240, 180))
 _FORMATS = ("h5", "txt", "csv", "npz", "zip", "folder", "evt3", "aedat4")
@@ -244,13 +244,13 @@ class Trial:
             "full disk": {0, 1},
             "a process killed": {0, 1},
         }
-        if kind == "SIGINT" and status == 1 and _PYTHON_BEGINS in told:
+        if kind == "SIGINT" and status == 1 and any(one in told for one in _PYTHON_BEGINS):
             self._record.counts["of these, while Python itself began"] += 1
             return
         if status not in allowed[kind]:
-            self.lose(f"exit status {status} after {kind}: {told[-300:]}")
+            self.lose(f"exit status {status} after {kind}: {told[-1000:]}")
         if "Traceback" in told and status not in (-2, 130):
-            self.lose(f"a traceback after {kind}: {told[-300:]}")
+            self.lose(f"a traceback after {kind}: {told[-1000:]}")
         if status == 0:
             self._record.counts["of these, it had ended before"] += 1
 
