@@ -23,10 +23,10 @@ LIMITS = {
     "cli": 1300,
     "comparison": 1165,
     "compilation": 285,
-    "config": 1305,
+    "config": 1309,
     "conversion": 1190,
-    "diagnosis": 8230,
-    "effects": 1548,
+    "diagnosis": 8320,
+    "effects": 1615,
     "exporting": 470,
     "files": 780,
     "formats": 5055,
@@ -44,7 +44,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 324
+FILES = 325
 """Most modules of all packages together."""
 
 _SLACK = 60

@@ -17,6 +17,7 @@ from adv2e.effects.hooks import Hooks
 from adv2e.effects.pixel.dark_current import DarkCurrentHooks
 from adv2e.effects.pixel.dead_pixels import DeadPixelsHooks
 from adv2e.effects.readout.arbiter import ArbiterHooks
+from adv2e.effects.readout.double_read import DoubleReadHooks
 from adv2e.effects.readout.event_loss import EventLossHooks
 from adv2e.effects.readout.frame_coupling import FrameCouplingHooks
 from adv2e.effects.readout.timestamp_tick import TimestampTickHooks
@@ -76,6 +77,9 @@ def _readout_hooks(readout: Readout, frames: Frames) -> Iterator[Hooks]:
         yield FrameCouplingHooks(readout.frame_coupling, 0.5 * frames.exposure_us)
     if readout.arbiter is not None:
         yield ArbiterHooks(readout.arbiter)
+    twice = readout.double_read
+    if twice is not None and (twice.on or twice.off):
+        yield DoubleReadHooks(twice)
     if readout.loss is not None and readout.loss.fraction:
         yield EventLossHooks(readout.loss)
 

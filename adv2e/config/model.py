@@ -25,6 +25,7 @@ from adv2e.effects.pixel.slew_limit import SlewLimit
 from adv2e.effects.pixel.source_follower import SourceFollower
 from adv2e.effects.pixel.thresholds import Thresholds
 from adv2e.effects.readout.arbiter import Arbiter
+from adv2e.effects.readout.double_read import DoubleRead
 from adv2e.effects.readout.event_loss import EventLoss
 from adv2e.effects.readout.frame_coupling import FrameCoupling
 from adv2e.errors import ConfigError
@@ -235,6 +236,7 @@ class Readout(Section):
         None, meaning="disturbance of the event pixels by the readout of frames"
     )
     arbiter: Arbiter | None = subsection(None, meaning="one channel for the events of all rows")
+    double_read: DoubleRead | None = subsection(None, meaning="events that are read twice")
     loss: EventLoss | None = subsection(None, meaning="events lost at random")
     tick_us: float = parameter(
         0.0,

@@ -82,6 +82,7 @@ EFFECTS = (
     Effect("pixel", "dead_pixels"),
     Effect("readout", "frame_coupling"),
     Effect("readout", "readout", ("readout.arbiter",), "arbiter"),
+    Effect("readout", "double_read"),
     Effect("readout", "event_loss", ("readout.loss",)),
     Effect("readout", "timestamp_tick", ("readout.tick_us",)),
 )

@@ -71,6 +71,10 @@ _LIBRARY: dict[str, dict[str, tuple[Any, Any, Any]]] = {
         "readout.arbiter.row_ns": (4000.0, 10000.0, 20000.0),
     },
     "event_loss": {"readout.loss.fraction": (0.06, 0.20, 0.45)},
+    "double_read": {
+        "readout.double_read.on": (0.002, 0.01, 0.05),
+        "readout.double_read.off": (0.004, 0.02, 0.1),
+    },
     "timestamp_tick": {"readout.tick_us": (50.0, 500.0, 2000.0)},
     "frame_encoding": {"frames.encoding": ("gamma:1.08", "gamma:1.25", "gamma:1.6")},
     "black_level": {"frames.black_level_dn": (0.5, 1.5, 2.8)},

@@ -83,6 +83,24 @@ def loss(stream: Stream, fraction: float, rng: np.random.Generator) -> Stream:
     return stream.kept(rng.random(len(stream.time)) >= fraction)
 
 
+def double_read(
+    stream: Stream, shares: tuple[float, float], one_is_on: bool, rng: np.random.Generator
+) -> Stream:
+    """Read a share of the ON, and one of the OFF events, again in the same or the next microsecond.
+
+    `one_is_on`: one of both readings is ON.  Source: stamps of ATIS and DVS128 cameras.
+    """
+    chosen = rng.random(len(stream.time)) < np.where(stream.polarity > 0, *shares)
+    again = stream.kept(chosen)
+    again = again._replace(time=again.time + 1e-6 * rng.integers(0, 2, len(again.time)))
+    if one_is_on:
+        is_first = rng.random(len(again.time)) < 0.5
+        stream = stream._replace(polarity=stream.polarity.copy())
+        stream.polarity[np.flatnonzero(chosen)[is_first]] = 1
+        again = again._replace(polarity=np.where(is_first, again.polarity, 1))
+    return Stream(*map(np.concatenate, zip(stream, again, strict=True))).in_order()
+
+
 def tick(stream: Stream, tick_s: float) -> Stream:
     r"""Stamp the events with a clock that ticks every `tick_s`, at the tick that follows.
 
@@ -131,6 +149,10 @@ def read_out(
     again = section(settings, "outside.echo")
     if again is not None:
         stream = echo(stream, again["share"], again["delay_us"] * 1e-6, rng("echo"))
+    twice = section(settings, "readout.double_read")
+    if twice is not None:
+        shares, one_is_on = (twice["on"], twice["off"]), twice.get("polarity") == "on"
+        stream = double_read(stream, shares, one_is_on, rng("double read"))
     lost = find(settings, "readout.loss.fraction", 0.0)
     if lost:
         stream = loss(stream, lost, rng("loss"))

@@ -42,6 +42,7 @@ _NAMES = {
     "pixel.dead_pixels": ("fraction",),
     "readout.frame_coupling": ("amplitude", "tau_us", "delay_us", "width_us", "period_us"),
     "readout.arbiter": ("event_ns", "row_ns"),
+    "readout.double_read": ("on", "off", "polarity"),
     "readout.loss": ("fraction",),
     "readout": ("tick_us",),
     "outside.surround": ("share", "sigma_px"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from camera.helpers import SHARP, ramp, seen, still
-from camera.readout import Stream, arbiter, loss, tick
+from camera.readout import Stream, arbiter, double_read, loss, tick
 
 pytestmark = pytest.mark.thorough
 
@@ -56,6 +56,19 @@ def test_loss_takes_its_share_at_random():
     kept = loss(whole, 0.25, np.random.default_rng(3))
     assert len(kept.time) == pytest.approx(3750, abs=130)
     assert np.array_equal(kept.time, kept.pixel)
+
+
+def test_each_polarity_has_its_share_of_events_that_are_read_twice():
+    polarity = np.tile([1, -1], 20_000)
+    whole = Stream(np.arange(40_000.0), np.arange(40_000), polarity)
+    found = double_read(whole, (0.1, 0.3), True, np.random.default_rng(3))
+    order = np.lexsort([found.time, found.pixel])
+    place, time, sign = found.pixel[order], found.time[order], found.polarity[order]
+    second = np.flatnonzero(np.diff(place) == 0) + 1
+    assert np.all(time[second] - time[second - 1] < 1.1e-6)
+    assert np.all((sign[second] > 0) | (sign[second - 1] > 0))
+    both = np.bincount(polarity[place[second]] + 1, minlength=3)
+    assert both[[2, 0]] == pytest.approx([2000, 6000], rel=0.06)
 
 
 def test_stamps_are_multiples_of_the_tick_and_never_early():

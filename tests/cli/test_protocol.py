@@ -25,7 +25,9 @@ def test_the_effects_that_it_names_are_those_of_the_library():
     known = {*names()} - {*OF_FRAMES}
     assert words - known == {"initial_reference"} - known
     unnamed = known - set(re.findall(r"\w+", TEXT))
-    told_by_the_events_alone = {"event_loss", "timestamp_tick", "clock_drift", "dead_pixels"}
+    told_by_the_events_alone = {
+        *("event_loss", "timestamp_tick", "clock_drift", "dead_pixels", "double_read")
+    }
     rest = {"dark_current", "photoreceptor_noise", "threshold_mismatch"}
     assert unnamed <= told_by_the_events_alone | rest
 

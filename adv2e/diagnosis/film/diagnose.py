@@ -33,19 +33,23 @@ from adv2e.diagnosis.diagnose import diagnose
 from adv2e.diagnosis.film.fitting import FilmFitter, Place, first_point
 from adv2e.diagnosis.film.nearness import DISTANCES, distances
 from adv2e.diagnosis.film.recordings import FilmRecordings, split
-from adv2e.diagnosis.film.registration import first_delays, first_view
+from adv2e.diagnosis.film.registration import first_delays, first_view, rests
 from adv2e.diagnosis.film.selection import FilmSearch, Step
 from adv2e.diagnosis.film.view import UNKNOWNS, Films, View
 from adv2e.diagnosis.fitting.candidates import NOTHING
 from adv2e.diagnosis.fitting.fitter import threshold_nuisance, thresholds_of
 from adv2e.diagnosis.fitting.library import OF_FRAMES, library
 from adv2e.diagnosis.hints.collect import Hints
+from adv2e.diagnosis.hints.stamps import double_reads
 from adv2e.diagnosis.outcome.findings import finding_of
 from adv2e.diagnosis.outcome.picture import pictures_of
 from adv2e.effects import label_of
 from adv2e.reports.result import Diagnosis, ErrorRow, Estimate, SceneNumber, Verdict
 
-_NOT_TRIED = (*OF_FRAMES, "clock_offset", "clock_drift", "readout", "timestamp_tick")
+_NOT_TRIED = (
+    *(*OF_FRAMES, "clock_offset", "clock_drift", "initial_reference"),
+    *("readout", "timestamp_tick"),
+)
 """Effects that the view stands for, or that recordings side by side cannot show."""
 _DRAWS = 6
 _ROUNDS = 25
@@ -131,11 +135,11 @@ def _before_pictures(
     telling.begin("finding where the camera looked")
     first = search.start(first_view(fitter.films, fitter.measured), declared)
     free = {parameter.key for parameter in nuisances.parameters}
+    hints = Hints(1.0, (), 1, double_read=double_reads(recordings.stream()))
     candidates = [
         one
-        for one in library(declared, Hints(1.0, (), 1))
+        for one in library(declared, hints)
         if one.name not in (*without, *_NOT_TRIED)
-        and one.parameters
         and not free & {each.key for each in one.parameters}
     ]
 
@@ -185,12 +189,15 @@ def halves_of(
     recordings: FilmRecordings, threads: int, count: Callable[[], None] = lambda: None
 ) -> tuple[FilmFitter, FilmFitter]:
     """Return fitters of the recordings that are fitted to and of those that judge, on one clock."""
-    delays_us = first_delays(recordings.stream(), len(recordings.events))
+    stream, number = recordings.stream(), len(recordings.events)
+    delays_us = first_delays(stream, number)
+    rests_us = rests(stream, number, delays_us)
+    late_us = np.tile(delays_us[:, None], len(rests_us) + 1)
     fitters = []
     for k in (0, 1):
         half = recordings.every_second(k)
-        fitter = FilmFitter(half.films, half.stream(), threads, count)
-        fitter.shift_us(delays_us[k::2])
+        fitter = FilmFitter(half.films, half.stream(), threads, count, rests_us)
+        fitter.shift_us(late_us[k::2])
         fitters.append(fitter)
     return fitters[0], fitters[1]
 
@@ -330,13 +337,13 @@ def evidence_of(films: Films, view: View, stream: Stream, name: str) -> Evidence
 
 
 def _interleaved(even: NDArray[np.float64], odd: NDArray[np.float64]) -> NDArray[np.float64]:
-    every = np.empty(len(even) + len(odd))
+    every = np.empty((len(even) + len(odd), even.shape[1]))
     every[::2], every[1::2] = even, odd
     return every
 
 
 def _late(late_us: NDArray[np.float64]) -> SceneNumber:
-    meaning = "by how much each recording began later on the path than the middle one"
+    meaning = "by how much each motion of each recording began later than the path says"
     return SceneNumber("late_ms", (late_us * 1e-3).round(2).tolist(), "ms", meaning, None)
 
 

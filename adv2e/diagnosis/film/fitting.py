@@ -8,9 +8,10 @@ only; so derivatives by every n-th of them are taken from one simulation.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +34,12 @@ _REACH = 2.5
 _STEP_PX, _LARGEST_PX = 0.3, 0.4
 _STEP, _LARGEST = 0.12, 0.2
 """Of a camera's key: change by which its derivative is taken, and most by which a step moves it."""
-_BEND_PX = 0.5
+_BEND_PX = 0.25
 """Standard deviation of the prior of a path's second differences from knot to knot [px]."""
 _SETTLED, _IN_A_ROW = 0.006, 2
 """Gain of a step, as a share of the misfit, below which a fit ends after so many such steps."""
+_EDGE = 6
+"""Events by which the rate at the ends of a recording is told."""
 _OFFSETS_US = np.arange(-6_000.0, 6_001.0, 500.0)
 """Changes of a recording's delay that are tried."""
 _VARIANCE, _TOLD = 3 * 0.25, 1e-4
@@ -70,8 +73,13 @@ def first_point(keys: Candidate) -> Array:
 class FilmFitter:
     """Simulates recordings of films, and fits views and cameras to them.
 
-    `measured`: the events of all recordings side by side; `begin` and `count` are told of stages
-    and simulations.
+    `measured`: the events of all recordings side by side; `rests_us`: times at which the camera
+    rests between two motions; `count` is told of simulations.
+
+    Attributes
+    ----------
+    delays_us : (recordings, motions)
+        By how much each motion of each recording is late.
     """
 
     def __init__(
@@ -80,6 +88,7 @@ class FilmFitter:
         measured: Stream,
         threads: int,
         count: Callable[[], None] = lambda: None,
+        rests_us: Sequence[float] = (),
     ) -> None:
         self.films, self._count, self._threads = films, count, threads
         first, last = (films.times_ns[[0, -1]] * 1e-3).tolist()
@@ -87,48 +96,67 @@ class FilmFitter:
         self.counting = Counting(width, height, len(films.pictures), (first, last))
         self._span_us = first, last
         self._as_read = measured
-        self.shift_us(np.zeros(len(films.pictures)))
+        self._recorded_us = _recorded(measured.t, self._number(measured), len(films.pictures))
+        self._rests_us = np.asarray(rests_us, np.float64)
+        self.shift_us(np.zeros((len(films.pictures), len(rests_us) + 1)))
 
     def shift_us(self, delays_us: Array) -> None:
-        """Take each recording to be late by so much, (recordings,) [us]."""
+        """Take each motion of each recording to be late by so much, (recordings, motions) [us]."""
         stream, self.delays_us = self._as_read, delays_us
-        number = stream.pixel % stream.width // self.films.size.width
-        t = stream.t - np.rint(delays_us).astype(np.int64)[number]
+        number = self._number(stream)
+        motion = np.searchsorted(self._rests_us, stream.t - delays_us.mean(axis=1)[number])
+        t = stream.t - np.rint(delays_us).astype(np.int64)[number, motion]
         order = np.argsort(t, kind="stable")
         moved = Stream(t[order], stream.pixel[order], stream.on[order], stream.width, stream.height)
         self.measured = moved.between(*self._span_us)
         self._wanted = self.counting.numbers(self.measured)
 
     def align(self, place: Place) -> None:
-        """Find anew by how much each recording is late, as a model says.
+        """Find anew by how much each motion of each recording is late, as a model says.
 
-        Pictures are seen along one path, but no two recordings begin at the same moment of it.
+        Pictures are seen along one path, but no two recordings begin at the same moment of it, nor
+        does a camera begin each of its motions at the same time after the one before.
         """
-        made = [self.counting.numbers(one) for one in self.streams(place.view, place.config, SEEDS)]
+        made = list(self._whole(place.view, place.config, SEEDS))
+        borders_us = [self._span_us[0], *self._rests_us.tolist(), self._span_us[1]]
+        bins = [self.counting.bins_between(*pair) for pair in pairwise(borders_us)]
         before, misfits = self.delays_us, []
         for offset in _OFFSETS_US:
             self.shift_us(before + offset)
-            first, second = (one - self._wanted for one in made)
-            misfits.append(first.each(second))
+            first, second = (self.counting.numbers(self._cut(one)) - self._wanted for one in made)
+            misfits.append(np.stack([first.each(second, of) for of in bins], axis=1))
         grid = np.array(misfits)
-        best = np.clip(grid.argmin(axis=0), 1, len(grid) - 2)
-        below, at, above = (grid[best + k, np.arange(grid.shape[1])] for k in (-1, 0, 1))
+        best = np.clip(grid.argmin(axis=0), 1, len(grid) - 2)[None]
+        below, at, above = (np.take_along_axis(grid, best + k, axis=0)[0] for k in (-1, 0, 1))
         bend = np.maximum(below - 2 * at + above, 1e-9)
         finer = np.clip(0.5 * (below - above) / bend, -0.5, 0.5)
-        self.shift_us(before + _OFFSETS_US[best] + finer * (_OFFSETS_US[1] - _OFFSETS_US[0]))
+        self.shift_us(before + _OFFSETS_US[best[0]] + finer * (_OFFSETS_US[1] - _OFFSETS_US[0]))
 
     def streams(self, view: View, config: Config, seeds: Sequence[int]) -> list[Stream]:
-        """Return the events of simulations of all recordings, one for each seed."""
+        """Return the events of simulations of all recordings, one for each seed.
+
+        Each recording has those of the time in which its camera recorded.
+        """
+        return [self._cut(one) for one in self._whole(view, config, seeds)]
+
+    def _whole(self, view: View, config: Config, seeds: Sequence[int]) -> Iterator[Stream]:
         light = self.films.light(view)
         instants = self.films.times_ns.tolist(), light
-        found = []
         for seed in seeds:
             events = events_of(
                 instants, replace(config, seed=config.seed + seed), threads=1, coarseness=FINE
             )
-            found.append(Stream.of(events, light.shape[2], light.shape[1]).between(*self._span_us))
+            yield Stream.of(events, light.shape[2], light.shape[1]).between(*self._span_us)
             self._count()
-        return found
+
+    def _cut(self, stream: Stream) -> Stream:
+        begin, end = (self._recorded_us - self.delays_us[:, [0, -1]]).T
+        number = self._number(stream)
+        return stream.chosen((stream.t >= begin[number]) & (stream.t <= end[number]))
+
+    def _number(self, stream: Stream) -> NDArray[np.intp]:
+        """Return which recording each event is of."""
+        return np.asarray(stream.pixel % stream.width // self.films.size.width)
 
     def residual(self, view: View, config: Config, seeds: Sequence[int] = SEEDS) -> list[Numbers]:
         """Return simulated less measured numbers, one for each seed."""
@@ -160,6 +188,22 @@ class FilmFitter:
         """
         with ThreadPoolExecutor(self._threads) as pool:
             return excess * _Descent(self, pool, UNKNOWNS, path=True).covariance(place)
+
+
+def _recorded(t: NDArray[np.int64], number: NDArray[np.intp], recordings: int) -> Array:
+    """Return when each recording began and ended, (recordings, 2) [us].
+
+    A camera records a little longer than its first and last event tell: by one more of the times
+    between the events there.
+    """
+    found = np.tile([-np.inf, np.inf], (recordings, 1))
+    for k in range(recordings):
+        own = t[number == k]
+        if len(own) < _EDGE:
+            continue  # nobody knows
+        wait = [float(np.ptp(side)) / (len(side) - 1) for side in (own[:_EDGE], own[-_EDGE:])]
+        found[k] = own[0] - wait[0], own[-1] + wait[1]
+    return found
 
 
 @dataclass(frozen=True)

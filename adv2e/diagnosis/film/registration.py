@@ -23,10 +23,13 @@ _STEP_PX = 0.5
 _MOST_FILMS = 16
 _SMALL = 10.0
 """Largest share of the sensor's shorter side that is tried, as one in so many; at least 4 px."""
-_SLOW_PX = 1.0
+_SLOW_PX = 0.5
 """Motion in the time of a knot that counts as one deviation."""
 _COURSE_US, _SOFT, _TURNS = 1000, 7, 10
 """Of courses in time: bins, those that are averaged, and rounds of alignment at most."""
+_LASTS, _HARDLY, _BUSY = 10, 0.2, 0.9
+"""Of a rest: bins of the course over which it is averaged, the largest share of the rate that is
+exceeded in a tenth of the time."""
 _KERNEL = np.array([0.25, 0.5, 0.25])
 
 
@@ -55,6 +58,22 @@ def first_delays(stream: Stream, recordings: int) -> Array:
             break
         late = found
     return np.asarray((late - np.round(np.median(late))) * float(_COURSE_US))
+
+
+def rests(stream: Stream, recordings: int, delays_us: Array) -> list[float]:
+    """Return the times at which the camera rests between two motions [us].
+
+    There hardly anything is seen, less than a share of what there is at most times.
+    """
+    number = stream.pixel % stream.width // (stream.width // recordings)
+    t = stream.t - delays_us[number]
+    bins = np.arange(t.min(), t.max() + 2 * _COURSE_US, _COURSE_US)
+    rate = np.convolve(np.histogram(t, bins)[0], np.ones(_LASTS) / _LASTS, "same")
+    quiet = rate < _HARDLY * np.quantile(rate, _BUSY)
+    borders = np.flatnonzero(np.diff(np.r_[False, quiet, False]))
+    spans = borders.reshape(-1, 2)
+    between = [span for span in spans if span[0] > 0 and span[1] < len(quiet)]
+    return [float(bins[low] + bins[high]) / 2 for low, high in between]
 
 
 def first_view(films: Films, measured: Stream) -> View:

@@ -28,7 +28,7 @@ from adv2e.geometry import Size
 Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
 
-KNOT_NS = 10_000_000
+KNOT_NS = 5_000_000
 """Time between the knots of a path."""
 STEP_NS = 2_000_000
 """Time between the instants at which the light of a picture is made; it is a line between them."""

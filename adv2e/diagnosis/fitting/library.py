@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import zip_longest
 from typing import Any
 
@@ -27,6 +27,7 @@ from adv2e.diagnosis.hints.collect import Hints
 from adv2e.diagnosis.hints.lamps import Lamp
 from adv2e.diagnosis.hints.readouts import WIDTH, has_pulse
 from adv2e.effects.pixel.initial_reference import RANDOM, SETTLED
+from adv2e.effects.readout.double_read import DoubleRead
 from adv2e.parameters import Fit
 from adv2e.reports.markup import BUILT_IN
 
@@ -76,7 +77,8 @@ def _from_many(candidate: Candidate) -> Candidate:
 
 def names(config: Config | None = None) -> list[str]:
     """Return the names of all effects that can be found, with those of the user's own."""
-    built_in = (one.name for one in _built_in(Config(), Hints(1.0, (Lamp(100.0),), 10)))
+    hints = Hints(1.0, (Lamp(100.0),), 10, double_read=DoubleRead(on=0.01, off=0.01))
+    built_in = (one.name for one in _built_in(Config(), hints))
     return list(dict.fromkeys([*built_in, *(user_effects(config) if config else ())]))
 
 
@@ -233,6 +235,10 @@ def _of_the_readout(values: dict[str, Any], hints: Hints) -> Iterator[Candidate]
         )
     yield Candidate("readout", times, starts, known=known)
     yield _of_one("event_loss", _parameter("readout.loss.fraction", 0.1))
+    twice = hints.double_read
+    if twice is not None and get_key(values, "readout.double_read") is None:
+        keys = ((f"readout.double_read.{key}", value) for key, value in asdict(twice).items())
+        yield Candidate("double_read", (), ((),), tuple(keys))
     tick_us = float(hints.tick_us) if hints.tick_us > 1 else 0.0
     if tick_us != (get_key(values, "readout.tick_us") or 0.0):
         yield Candidate("timestamp_tick", (), ((),), (("readout.tick_us", tick_us),))

@@ -15,8 +15,9 @@ from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.hints.lamps import Lamp, lamps_of, strongest_lines
 from adv2e.diagnosis.hints.own_period import OwnPeriod
 from adv2e.diagnosis.hints.readouts import Pulse, Readouts, pulse_of, readouts_of
-from adv2e.diagnosis.hints.stamps import Service, service_times, tick_of
+from adv2e.diagnosis.hints.stamps import Service, double_reads, service_times, tick_of
 from adv2e.diagnosis.simulation.simulator import Simulator
+from adv2e.effects.readout.double_read import DoubleRead
 
 _LAMP_SEED = 9_998
 _HARDLY_ANY = 0.01
@@ -57,6 +58,8 @@ class Hints:
     pulse: Pulse | None = None
     own_period: OwnPeriod | None = None
     too_many: tuple[float, float] = (1.0, 1.0)
+    double_read: DoubleRead | None = None
+    """Shares of events that were read twice, where some were."""
     shortest_us: float | None = None
     """Interval between events of a pixel, 1 % quantile [us], under known light.  All pixels then do
     the same at the same time, so that fits find a refractory period only from near it."""
@@ -89,6 +92,7 @@ def hints_of(
             (),
             tick_of(stream.t),
             service=service_times(stream),
+            double_read=double_reads(stream),
             too_many=too_many,
             shortest_us=float(np.quantile(apart, _HARDLY_ANY)) if len(apart) else None,
         )
@@ -107,6 +111,7 @@ def hints_of(
         None if own_period else pulse_of(looked_at, evidence.times_s, evidence.before_s),
         own_period,
         too_many,
+        double_reads(stream),
     )
 
 

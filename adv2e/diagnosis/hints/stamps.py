@@ -1,4 +1,4 @@
-"""Timestamp resolution and arbiter times from the timestamps, where fits of the readout start.
+"""Timestamp resolution, arbiter times and double reads, where fits of the readout start.
 
 Fits do not find the times of an arbiter by steps from anywhere: timestamps of a busy channel form
 a comb, and a comb of other times is as far from it as none.
@@ -12,8 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.data.splits import Stream
+from adv2e.effects.readout.double_read import DoubleRead
 
 _STAMPS = 20
+_FEWEST_TWICE = 10
+"""Fewest events that were read twice, below which it is an accident."""
 _ON_TICK = 0.99
 
 _LEAST_US = 3
@@ -51,6 +54,27 @@ def tick_of(times_us: NDArray[np.int64]) -> int:
     steps, often = np.unique(np.gcd.reduce(groups, axis=0), return_counts=True)
     step = max(1, int(steps[np.argmax(often)]))
     return step if np.mean(times_us % step == 0) >= _ON_TICK else 1
+
+
+def double_reads(stream: Stream) -> DoubleRead | None:
+    """Return the shares of events that were read twice: two events of a pixel within 1 us.
+
+    Where the polarities of the two differ as often as not, one of both is always ON.
+    """
+    if tick_of(stream.t) > 1:
+        return None
+    twice = (stream.since >= 0) & (stream.since <= 1)
+    if np.count_nonzero(twice) < _FEWEST_TWICE:
+        return None
+    sums = (stream.on + stream.on_before)[twice]
+    off, mixed, on = np.bincount(sums, minlength=3).tolist()
+    polarity = "on" if mixed > off else "same"
+    of_off = mixed if polarity == "on" else off
+    ons = np.count_nonzero(stream.on)
+    # the second readings are no events of their own
+    once = max(ons - on - (of_off if polarity == "on" else 0), 1), max(len(stream) - ons - off, 1)
+    shares = (float(f"{n / of:.3g}") for n, of in zip((on, of_off), once, strict=True))
+    return DoubleRead(**dict(zip(("on", "off"), shares, strict=True)), polarity=polarity)
 
 
 def service_times(stream: Stream) -> Service | None:

@@ -127,7 +127,7 @@ HIDDEN: Mapping[str, tuple[str, ...]] = {
 WITHOUT = """
 thresholds initial_reference threshold_mismatch threshold_drift low_pass dark_current
 source_follower high_pass slew_limit photoreceptor_noise reset_overshoot leak photo_leak shot_noise
-hot_pixels dead_pixels frame_coupling readout timestamp_tick black_level exposure_blur
+hot_pixels dead_pixels frame_coupling readout double_read timestamp_tick black_level exposure_blur
 clock_offset clock_drift misregistration flicker frame_encoding
 """
 """All effects but refractory and event_loss: all take minutes."""
