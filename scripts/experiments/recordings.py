@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -142,17 +142,7 @@ class Recording:
         A simulator that cannot be run anew is returned as it is.
         """
         goal = totals(cut(self.events, windows.start, windows.stop))
-        levels = simulator.levels
-        if levels is None:
-            made = np.array(totals(self.made(simulator, windows, [0])[0]))
-            return simulator, float(np.max(np.abs(made - goal) / np.maximum(goal, 1)))
-
-        def counts(on: float, off: float) -> tuple[int, int]:
-            return totals(self.made(simulator.with_levels(on, off), windows, [0])[0])
-
-        within = min(levels) / WIDEST, max(levels) * WIDEST
-        found, miss = match_totals(counts, levels, goal, within=within)
-        return simulator.with_levels(*found), miss
+        return matched(simulator, goal, lambda one: totals(self.made(one, windows, [0])[0]))
 
     def all_matched(
         self, simulators: Sequence[Simulator], windows: Windows
@@ -168,6 +158,26 @@ class Recording:
             click.echo(f"{self.name}: {label}: totals miss by {miss:.1%}", err=True)
             found[label] = simulator
         return found
+
+
+def matched(
+    simulator: Simulator, goal: tuple[int, int], made: Callable[[Simulator], tuple[int, int]]
+) -> tuple[Simulator, float]:
+    """Return a simulator with thresholds that match totals of ON and OFF, and what they miss by.
+
+    `made` returns the totals that a simulator makes.
+    """
+    levels = simulator.levels
+    if levels is None:
+        off_by = np.abs(np.subtract(made(simulator), goal)) / np.maximum(goal, 1)
+        return simulator, float(np.max(off_by))
+    found, miss = match_totals(
+        lambda on, off: made(simulator.with_levels(on, off)),
+        levels,
+        goal,
+        within=(min(levels) / WIDEST, max(levels) * WIDEST),
+    )
+    return simulator.with_levels(*found), miss
 
 
 def read(folder: str) -> Recording:

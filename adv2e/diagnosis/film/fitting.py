@@ -97,14 +97,14 @@ class FilmFitter:
         self._span_us = first, last
         self._as_read = measured
         self._recorded_us = _recorded(measured.t, self._number(measured), len(films.pictures))
-        self._rests_us = np.asarray(rests_us, np.float64)
+        self.rests_us = np.asarray(rests_us, np.float64)
         self.shift_us(np.zeros((len(films.pictures), len(rests_us) + 1)))
 
     def shift_us(self, delays_us: Array) -> None:
         """Take each motion of each recording to be late by so much, (recordings, motions) [us]."""
         stream, self.delays_us = self._as_read, delays_us
         number = self._number(stream)
-        motion = np.searchsorted(self._rests_us, stream.t - delays_us.mean(axis=1)[number])
+        motion = np.searchsorted(self.rests_us, stream.t - delays_us.mean(axis=1)[number])
         t = stream.t - np.rint(delays_us).astype(np.int64)[number, motion]
         order = np.argsort(t, kind="stable")
         moved = Stream(t[order], stream.pixel[order], stream.on[order], stream.width, stream.height)
@@ -118,12 +118,12 @@ class FilmFitter:
         does a camera begin each of its motions at the same time after the one before.
         """
         made = list(self._whole(place.view, place.config, SEEDS))
-        borders_us = [self._span_us[0], *self._rests_us.tolist(), self._span_us[1]]
+        borders_us = [self._span_us[0], *self.rests_us.tolist(), self._span_us[1]]
         bins = [self.counting.bins_between(*pair) for pair in pairwise(borders_us)]
         before, misfits = self.delays_us, []
         for offset in _OFFSETS_US:
             self.shift_us(before + offset)
-            first, second = (self.counting.numbers(self._cut(one)) - self._wanted for one in made)
+            first, second = (self._off_by(one) for one in made)
             misfits.append(np.stack([first.each(second, of) for of in bins], axis=1))
         grid = np.array(misfits)
         best = np.clip(grid.argmin(axis=0), 1, len(grid) - 2)[None]
@@ -137,7 +137,7 @@ class FilmFitter:
 
         Each recording has those of the time in which its camera recorded.
         """
-        return [self._cut(one) for one in self._whole(view, config, seeds)]
+        return [self.recorded(one) for one in self._whole(view, config, seeds)]
 
     def _whole(self, view: View, config: Config, seeds: Sequence[int]) -> Iterator[Stream]:
         light = self.films.light(view)
@@ -149,7 +149,11 @@ class FilmFitter:
             yield Stream.of(events, light.shape[2], light.shape[1]).between(*self._span_us)
             self._count()
 
-    def _cut(self, stream: Stream) -> Stream:
+    def _off_by(self, stream: Stream) -> Numbers:
+        return self.counting.numbers(self.recorded(stream)) - self._wanted
+
+    def recorded(self, stream: Stream) -> Stream:
+        """Return those events of all recordings side by side that are of the time of each."""
         begin, end = (self._recorded_us - self.delays_us[:, [0, -1]]).T
         number = self._number(stream)
         return stream.chosen((stream.t >= begin[number]) & (stream.t <= end[number]))
@@ -160,9 +164,7 @@ class FilmFitter:
 
     def residual(self, view: View, config: Config, seeds: Sequence[int] = SEEDS) -> list[Numbers]:
         """Return simulated less measured numbers, one for each seed."""
-        return [
-            self.counting.numbers(one) - self._wanted for one in self.streams(view, config, seeds)
-        ]
+        return [self._off_by(one) for one in self._whole(view, config, seeds)]
 
     def each(self, view: View, config: Config, seeds: Sequence[int] = SEEDS) -> Array:
         """Return the misfit of each recording, (recordings,), without the chance of simulations."""

@@ -29,14 +29,18 @@ def test_each_configuration_has_its_distances_and_its_events(tmp_path):
         write_events(tmp_path / f"{k}.npz", _recording(random, 500), (12, 12))
         picture = cv2.GaussianBlur(random.uniform(0, 255, (12, 12)), (0, 0), 1.5)
         assert cv2.imwrite(str(tmp_path / f"{k}.png"), picture.astype(np.uint8))
+    labels = "".join(f"{k}.npz {k}.png {k % 2}\n" for k in range(4))
+    (tmp_path / "labels.txt").write_text("# file picture class\n" + labels)
     arguments = [
         tmp_path,
         "--size",
         "12x12",
-        "--events",
+        "--suffix",
         ".npz",
-        "-c",
+        "--simulators",
         "ideal",
+        "--train",
+        tmp_path,
         "-o",
         tmp_path / "a.md",
     ]
@@ -44,6 +48,8 @@ def test_each_configuration_has_its_distances_and_its_events(tmp_path):
     assert outcome.exit_code == 0, outcome.output
     found = json.loads((tmp_path / "a.json").read_text("utf-8"))["ideal"]
     assert list(found["distances"]) == list(DISTANCES)
+    assert 0.0 <= found["classes"] <= 1.0
+    assert found["without pictures"]["the same, measured "] == pytest.approx(0.5, abs=0.05)
     assert "| ideal |" in (tmp_path / "a.md").read_text("utf-8")
     # two rows of two recordings that judge, six times as large, with a border
     assert cv2.imread(str(tmp_path / "a.png")).shape == (2 * 80, 2 * 80, 3)
