@@ -17,7 +17,7 @@ events.npz.  Where a camera recorded nothing for a while, simulated events are l
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -36,8 +36,8 @@ from adv2e.events import Events, empty_events
 from adv2e.sources.times.rates import seconds
 from experiments import side_by_side
 from experiments.clip import Simulator
-from experiments.recordings import SCORE, Judged, Recording, halves, read
-from experiments.simulators import Pixel, natures, simulator_options
+from experiments.recordings import SCORE, Judged, Recording, all_but_one, halves, read
+from experiments.simulators import Pixel, interpolated, natures, simulator_options
 
 HEADER = (
     "Configurations named after a tool are that tool's parameters in the pixel of adv2e, not the"
@@ -73,6 +73,16 @@ COLUMNS = {
     " match, judged on the second.",
 )  # fmt: skip
 @click.option(
+    "--leave-one-out", "leaving", is_flag=True,
+    help="Add a table for each frame interval: thresholds set so that the totals of all others"
+    " match, judged on it. For recordings of a few frames.",
+)  # fmt: skip
+@click.option(
+    "--interpolation", "interpolations", multiple=True, metavar="NAME",
+    help="linear, flow or a network's ONNX file: each configuration of adv2e has a row with it."
+    " Repeatable. Without: as configured.",
+)  # fmt: skip
+@click.option(
     "--seeds", type=click.IntRange(min=2), default=2, show_default=True,
     help="Simulations of each; values are their means, floors the means over their pairs.",
 )  # fmt: skip
@@ -81,8 +91,10 @@ COLUMNS = {
 @output_option
 def main(
     recordings: tuple[str, ...], simulators: list[Simulator], seeds: int, matching: bool,
-    pages: Path | None, output: Path | None,
+    leaving: bool, interpolations: tuple[str, ...], pages: Path | None, output: Path | None,
 ) -> None:  # fmt: skip
+    if interpolations:
+        simulators = interpolated(simulators, interpolations)
     parts = [HEADER, natures(simulators)]
     numbers: dict[str, Any] = {"simulators": {one.name: one.nature for one in simulators}}
     for path in recordings:
@@ -93,6 +105,8 @@ def main(
         trials = [Trial(measured, shipped, measured.windows, "thresholds as shipped")]
         if matching:
             trials.append(with_matched_totals(measured, simulators))
+        if leaving:
+            trials += with_one_left_out(measured, simulators)
         for trial in trials:
             rows = trial.judged(seeds)
             parts.append(trial.section(rows))
@@ -125,12 +139,28 @@ class Row:
 def with_matched_totals(measured: Recording, simulators: Sequence[Simulator]) -> Trial:
     """Return the trial of simulators whose totals match on the first half, on the second."""
     first, second = halves(measured.windows)
-    found = measured.all_matched(simulators, first)
+    return _matched(
+        measured, simulators, first, second, "totals matched before", f"from {_span(first)}"
+    )
+
+
+def with_one_left_out(measured: Recording, simulators: Sequence[Simulator]) -> Iterator[Trial]:
+    """Yield trials of simulators whose totals match on all frame intervals but one, on that."""
+    for others, one in all_but_one(measured.windows):
+        title, where = f"totals matched outside {_span(one)}", "in the other frame intervals"
+        yield _matched(measured, simulators, others, one, title, where)
+
+
+def _matched(
+    measured: Recording, simulators: Sequence[Simulator], fit: Windows, judge: Windows, title: str,
+    where: str,
+) -> Trial:  # fmt: skip
+    found = measured.all_matched(simulators, fit)
     about = (
         "Thresholds, each in the unit of its simulator, are such that the totals of ON and of OFF"
-        f" events match from {_span(first)}; (!): they do not, to {TOLERANCE:.0%}."
+        f" events match {where}; (!): they do not, to {TOLERANCE:.0%}."
     )
-    return Trial(measured, found, second, "totals matched before", about)
+    return Trial(measured, found, judge, title, about)
 
 
 def _span(windows: Windows) -> str:

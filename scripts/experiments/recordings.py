@@ -45,6 +45,12 @@ def totals(events: Events) -> tuple[int, int]:
     return on, len(events) - on
 
 
+def _totals_in(events: Events, windows: Windows) -> tuple[int, int]:
+    """Return the counts of ON and OFF events in each of the windows, added up."""
+    found = [totals(cut(events, start, stop)) for start, stop in windows.used]
+    return sum(on for on, _ in found), sum(off for _, off in found)
+
+
 @dataclass(frozen=True)
 class Counts:
     """Means over streams of what is told of each by itself; None where it is not defined."""
@@ -139,10 +145,12 @@ class Recording:
     def matched(self, simulator: Simulator, windows: Windows) -> tuple[Simulator, float]:
         """Return it with thresholds that match the totals in the windows, and what they miss by.
 
-        A simulator that cannot be run anew is returned as it is.
+        A simulator that cannot be run anew is returned as it is.  The windows may have gaps.
         """
-        goal = totals(cut(self.events, windows.start, windows.stop))
-        return matched(simulator, goal, lambda one: totals(self.made(one, windows, [0])[0]))
+        goal = _totals_in(self.events, windows)
+        return matched(
+            simulator, goal, lambda one: _totals_in(self.made(one, windows, [0])[0], windows)
+        )
 
     def all_matched(
         self, simulators: Sequence[Simulator], windows: Windows
@@ -255,3 +263,14 @@ def halves(windows: Windows) -> tuple[Windows, Windows]:
         )
     first, second = windows.used[:middle], windows.used[middle:]
     return replace(windows, used=first), replace(windows, used=second)
+
+
+def all_but_one(windows: Windows) -> Iterator[tuple[Windows, Windows]]:
+    """Yield, for each of the windows, all others and it alone."""
+    if len(windows.used) < 2:
+        raise DataError(
+            "two frame intervals or more that events cover are needed to leave one of them out"
+        )
+    for k, one in enumerate(windows.used):
+        others = windows.used[:k] + windows.used[k + 1 :]
+        yield replace(windows, used=others), replace(windows, used=(one,))

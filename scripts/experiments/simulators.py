@@ -6,6 +6,7 @@ themselves; any other by the events that it wrote; and :mod:`experiments.voltmet
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -14,20 +15,25 @@ from functools import cached_property, wraps
 from importlib import metadata
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import click
 import numpy as np
 from benchmarks.worker import TOOLS
+from numpy.typing import NDArray
 from writing import one_line_errors, table, threads_option
 
 from adv2e.comparison.resimulation import resimulator
 from adv2e.config import Config, load_config
+from adv2e.config.model import Sampling
 from adv2e.effects.frames.encoding import encode_light
 from adv2e.effects.pixel.thresholds import FLOOR
 from adv2e.errors import ConfigError, DataError, MissingExtraError
 from adv2e.events import Events, make_events, sort_events
 from adv2e.formats.reading import open_events, read_events
 from adv2e.geometry import Size
+from adv2e.light.interpolation import Upsampler, make_upsampler
+from adv2e.light.interpolation.linear import NOTHING, Beside
 from adv2e.sources import Frame
 from experiments.clip import Clip, Simulator
 from experiments.voltmeter import Voltmeter
@@ -54,7 +60,8 @@ class Pixel:
 
         # the clip is on the sensor already, whatever camera the configuration is of
         config = replace(self.config, sensor=None)
-        return resimulator(frames, config, "linear", clip.size, threads=self.threads)(seed)
+        with patch("adv2e.light.intervals.make_upsampler", _remembering):
+            return resimulator(frames, config, "linear", clip.size, threads=self.threads)(seed)
 
     @property
     def levels(self) -> tuple[float, float]:
@@ -72,6 +79,59 @@ class Pixel:
         """Return it with pixels that begin anywhere between their thresholds."""
         pixel = replace(self.config.pixel, initial_reference="random")
         return replace(self, config=replace(self.config, pixel=pixel))
+
+    def interpolating(self, interpolation: str) -> Pixel:
+        """Return it with ``linear``, ``flow``, or the network in an ONNX file between frames."""
+        sampling = self.config.sampling
+        if interpolation in ("linear", "flow"):
+            sampling = replace(sampling, interpolation=interpolation, model=None)
+        else:
+            sampling = replace(sampling, interpolation="onnx", model=interpolation)
+        name = f"{self.name} {Path(interpolation).stem}"
+        return replace(self, name=name, config=replace(self.config, sampling=sampling))
+
+
+def interpolated(simulators: Sequence[Simulator], interpolations: Sequence[str]) -> list[Simulator]:
+    """Return the simulators, each pixel of adv2e once with each of the interpolations."""
+    found: list[Simulator] = []
+    for one in simulators:
+        found += map(one.interpolating, interpolations) if isinstance(one, Pixel) else [one]
+    return found
+
+
+@dataclass(frozen=True)
+class _Remembered:
+    """An upsampler whose frames are kept: thresholds are sought on the same frames many times."""
+
+    upsampler: Upsampler
+    asked: str
+    kept: dict[bytes, list[NDArray[Any]]]
+
+    def count(self, a: NDArray[Any], b: NDArray[Any], beside: Beside = NOTHING) -> int:
+        return self.upsampler.count(a, b, beside)
+
+    def between(
+        self, a: NDArray[Any], b: NDArray[Any], beside: Beside = NOTHING
+    ) -> Iterator[NDArray[Any]]:
+        key = hashlib.sha256(self.asked.encode())
+        for one in (a, b, beside.before, beside.after):
+            key.update(b"" if one is None else np.ascontiguousarray(one).data)
+            key.update(str(None if one is None else (one.shape, one.dtype)).encode())
+        key.update(f"{beside.span_before} {beside.span_after}".encode())
+        if key.digest() not in self.kept:
+            while sum(len(made) for made in self.kept.values()) * a.nbytes > _KEPT_BYTES:
+                self.kept.pop(next(iter(self.kept)))
+            self.kept[key.digest()] = list(self.upsampler.between(a, b, beside))
+        return iter(self.kept[key.digest()])
+
+
+_KEPT_BYTES = 3 << 30
+_kept: dict[bytes, list[NDArray[Any]]] = {}
+
+
+def _remembering(sampling: Sampling, *, threads: int = 1) -> Upsampler:
+    """Return what :func:`make_upsampler` does, with its frames remembered."""
+    return _Remembered(make_upsampler(sampling, threads=threads), repr(sampling), _kept)
 
 
 QUIET = {"leak_rate_hz": 0.0, "shot_noise_rate_hz": 0.0}

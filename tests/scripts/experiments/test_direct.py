@@ -225,3 +225,71 @@ def test_events_of_a_simulator_by_file_are_cut_to_the_windows(measured, tmp_path
     write_events(made, make_events([1, 50_000, 119_000], [1, 2, 3], [1, 2, 3], [1, 0, 1]), (16, 12))
     (events,) = measured.made(ByFile("one", made), measured.windows, [0])
     assert events["t"].tolist() == [50_000]
+
+
+def test_each_frame_interval_is_judged_by_thresholds_of_the_others(recording):
+    result = run(recording, "--simulators", "ideal", "--leave-one-out")
+    assert result.exit_code == 0, result.stderr
+    found = tables(result.stdout)
+    titles = [title for title in found if "outside" in title]
+    assert titles == [
+        f"waves: totals matched outside 0.0{k} to 0.{end} s"
+        for k, end in ((2, "04"), (4, "06"), (6, "08"), (8, "1"))
+    ]
+    events = read(str(recording)).events
+    for k, title in enumerate(titles, start=1):
+        label, cell = found[title][2][:2]
+        words = label.split(" ")
+        assert float(words[2]) == pytest.approx(ON, rel=0.05)
+        assert float(words[4]) == pytest.approx(OFF, rel=0.05)
+        inside = (events["t"] >= 20_000 * k) & (events["t"] < 20_000 * (k + 1))
+        assert f"/ {inside.sum():,} (" in cell
+
+
+def test_the_interval_that_is_judged_has_no_part_in_its_thresholds(tmp_path):
+    events = events_of(TRUTH)
+    # twice as many events in one interval, which the thresholds of the others must not see
+    more = events[(events["t"] >= 40_000) & (events["t"] < 60_000)].copy()
+    more["t"] += 1
+    both = np.sort(np.concatenate((events, more)), order="t", kind="stable")
+    folder = write_recording(tmp_path / "waves", TIMES, moving_waves(), both)
+    found = tables(run(folder, "--simulators", "ideal", "--leave-one-out").stdout)
+    on = {title: float(rows[2][0].split(" ")[2]) for title, rows in found.items() if "out" in title}
+    alone = on.pop("waves: totals matched outside 0.04 to 0.06 s")
+    assert alone == pytest.approx(ON, rel=0.05)
+    assert max(on.values()) < 0.9 * ON
+
+
+def test_one_interval_cannot_be_left_out_of_one(tmp_path):
+    events = events_of(TRUTH)
+    part = events[(events["t"] > 19_000) & (events["t"] < 41_000)]
+    folder = write_recording(tmp_path / "short", TIMES, moving_waves(), part)
+    result = run(folder, "--simulators", "ideal", "--leave-one-out")
+    assert result.exit_code == 1
+    assert "two frame intervals or more that events cover are needed" in result.stderr
+
+
+def test_interpolations_give_each_configuration_a_row_as_a_conversion_has_it(tmp_path):
+    y, x = np.mgrid[:48, :64]
+    bumps = np.sin(x / 3.1 + y / 7.7) + np.cos(y / 2.7 - x / 9.3)
+    frames = np.stack([np.roll(120 + 50 * bumps, 2 * k, 1) for k in range(FRAMES)])
+    frames = np.rint(frames).astype(np.uint8)
+    made = {
+        way: np.concatenate(list(simulate(frames, TIMES, config, threads=1)))
+        for way in ("linear", "flow")
+        for config in [load_config(["ideal"], [LIGHT, f"sampling.interpolation={way}"])]
+    }
+    folder = write_recording(tmp_path / "bumps", TIMES, frames, made["flow"])
+    words = ("--simulators", "ideal,dvs-voltmeter")
+    result = run(folder, *words, "--interpolation", "linear", "--interpolation", "flow")
+    assert result.exit_code == 0, result.stderr
+    rows = tables(result.stdout)["bumps: thresholds as shipped"][2:]
+    assert [row[0] for row in rows[:3]] == ["ideal linear †", "ideal flow †", "dvs-voltmeter"]
+    measured = read(str(folder))
+    start, stop = measured.windows.start, measured.windows.stop
+    for row, way in zip(rows, ("linear", "flow"), strict=False):
+        inside = (made[way]["t"] >= start) & (made[way]["t"] < stop)
+        assert row[1].startswith(f"{inside.sum():,} / ")
+    # twice, the second time from what is remembered: the same events to the last bit
+    assert rows[1][3].startswith("0.00 (")
+    assert not rows[0][3].startswith("0.00 (")
