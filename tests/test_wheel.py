@@ -36,5 +36,15 @@ def test_wheel_holds_the_shipped_configurations(tmp_path):
         cwd=tmp_path, capture_output=True, text=True, check=True,
     )  # fmt: skip
     names = outcome.stdout.split()
-    for name in ("adv2e", "paper", "v2e", "vid2e", "ideal", "davis240c", "davis346", "train-v2e"):
+    for name in (
+        "adv2e",
+        "paper",
+        "v2e",
+        "vid2e",
+        "ideal",
+        "davis240c",
+        "davis346",
+        "gen4",
+        "train-v2e",
+    ):
         assert name in names

@@ -20,7 +20,7 @@ from adv2e.config import (
 )
 from adv2e.errors import ConfigError
 
-NAMES = ["adv2e", "davis240c", "davis346", "ideal", "paper", "v2e", "vid2e"]
+NAMES = ["adv2e", "davis240c", "davis346", "gen4", "ideal", "paper", "v2e", "vid2e"]
 RANDOM = ["train-e2vid", "train-ecnn", "train-v2e", "train-v2e-dark"]
 """Those from which only batches draw."""
 
@@ -134,7 +134,7 @@ def test_those_that_are_drawn_are_as_their_sources_say():
     assert all(0.1 < pixel.leak.rate_hz < 0.5 for pixel in spreads["train-v2e"])
 
 
-@pytest.mark.parametrize("name", ["adv2e", "davis240c", "davis346"])
+@pytest.mark.parametrize("name", ["adv2e", "davis240c", "davis346", "gen4"])
 def test_cameras_have_run_before_in_good_light(name):
     pixel = load_config([name]).pixel
     assert pixel.initial_reference == "running"
