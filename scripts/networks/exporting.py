@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -77,7 +78,8 @@ def _write(network: Network, path: Path) -> None:
     frame = frame.reshape(1, network.channels, rows, columns)
     free = {2 + k: network.multiple * torch.export.Dim(f"n{k}") for k in (0, 1)}
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)  # tells of packages that nobody needs
-    with torch.no_grad():
+    with torch.no_grad(), warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)  # of PyTorch, about its own code
         traced = torch.export.export(
             network.module,
             (frame, frame.flip(3), torch.tensor([0.4])),
