@@ -45,6 +45,7 @@ def test_wheel_holds_the_shipped_configurations(tmp_path):
         "davis240c",
         "davis346",
         "gen4",
+        "atis",
         "train-v2e",
     ):
         assert name in names

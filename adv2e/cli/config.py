@@ -51,7 +51,7 @@ def group() -> None:
     switches an effect off. 'adv2e config' alone is 'adv2e config show'.
 
     These are shipped, and used by name: adv2e (the defaults), paper, v2e, vid2e, ideal, davis240c,
-    davis346, gen4. Over these, 'adv2e batch' may lay one with numbers to draw: train-e2vid,
+    davis346, gen4, atis. Over these, 'adv2e batch' may lay one with numbers to draw: train-e2vid,
     train-ecnn, train-v2e, train-v2e-dark.
     """
 

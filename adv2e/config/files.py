@@ -62,7 +62,7 @@ def template(name: str) -> str:
     texts = {one: find(one).read_text("utf-8").splitlines() for one in shipped()}
     cameras = [one for one, text in texts.items() if "sensor:" in text]
     if name not in cameras:
-        raise ConfigError(f"{name}: no camera that is shipped, must be {' or '.join(cameras)}")
+        raise ConfigError(f"{name}: no camera that is shipped, must be one of {', '.join(cameras)}")
     written, is_known = [_TEMPLATE.format(name=name)], False
     for line in texts[name]:
         if line and not line[0].isspace() and not line.startswith("#"):

@@ -274,7 +274,7 @@ def test_the_template_holds_the_sensor_and_all_else_as_comments(adv2e, tmp_path)
     assert load_config(path).pixel == load_config("davis346").pixel
     refused = adv2e("config", "template", "v2e")
     assert refused.status == 1
-    assert "must be davis240c or davis346" in refused.err
+    assert "must be one of atis, davis240c, davis346, gen4" in refused.err
 
 
 @pytest.mark.parametrize("name", ["DAVIS346", "Davis346", "davis364"])

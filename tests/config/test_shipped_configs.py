@@ -20,7 +20,7 @@ from adv2e.config import (
 )
 from adv2e.errors import ConfigError
 
-NAMES = ["adv2e", "davis240c", "davis346", "gen4", "ideal", "paper", "v2e", "vid2e"]
+NAMES = ["adv2e", "atis", "davis240c", "davis346", "gen4", "ideal", "paper", "v2e", "vid2e"]
 RANDOM = ["train-e2vid", "train-ecnn", "train-v2e", "train-v2e-dark"]
 """Those from which only batches draw."""
 
@@ -159,7 +159,7 @@ def test_these_have_neither_filter_nor_noise(name):
 
 
 def test_an_unknown_name_lists_the_names():
-    with pytest.raises(ConfigError, match=r"v2: no such file or shipped .*'v2e'\?.* adv2e, davis"):
+    with pytest.raises(ConfigError, match=r"v2: no such file .*'v2e'\?.* adv2e, atis, davis"):
         load_config(["v2"])
 
 

@@ -1,7 +1,7 @@
 """Double reads: events that the readout hands on twice.
 
-An ON event is read a second time with the probability given by `on`, an OFF event with that given
-by `off`; the two readings are 0 or 1 us apart, either as often.  With polarity: same, both are as
+An ON event is read a second time with the probability given by on, an OFF event with that given
+by off; the two readings are 0 or 1 us apart, either as often.  With polarity: same, both are as
 the event is.  With polarity: on, one of both is ON, the first or the second as often; the other is
 as the event is.  Both have the cause of the event.  The n-th event of a pixel has a draw of its
 own.

@@ -211,7 +211,8 @@ OTHERS = (
 
 def in_memory() -> Iterator[tuple[str, Run]]:
     """Yield all simulations through `adv2e.simulate`, with their names."""
-    for name in ("adv2e", "paper", "v2e", "vid2e", "ideal", "davis240c", "davis346", "gen4"):
+    cameras = "davis240c", "davis346", "gen4", "atis"
+    for name in ("adv2e", "paper", "v2e", "vid2e", "ideal", *cameras):
         yield f"config {name}", simulation(["sensor=null"], file=name)
     for title, base, lines in (
         ("noiseless", NOISELESS, QUIET_CASES), ("noise", BUSY, BUSY_CASES),
