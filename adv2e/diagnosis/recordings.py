@@ -170,7 +170,7 @@ def _pairs(
         if len(recordings) != 1:
             raise UsageError(
                 f"{len(recordings)} recordings are given: one is diagnosed, or with --film or"
-                " --films those of one camera before known pictures"
+                " --films those of one camera before known pictures; an output is put behind -o"
             )
         return [], [] if light is None else [light]
     if any(options[name] is not None for name in ("start_s", "stop_s", "crop")):
