@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,9 +14,9 @@ from adv2e.config.model import Frames, Sensor
 from adv2e.diagnosis.data.evidence import check_events
 from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.film.view import STEP_NS, Films
+from adv2e.diagnosis.tables.table import read_table
 from adv2e.errors import DataError
 from adv2e.events import Events
-from adv2e.files.regular import read_text, shown
 from adv2e.formats.reading import read_events
 from adv2e.geometry import Size
 from adv2e.light.decoding import decoder_for
@@ -85,20 +83,16 @@ def read_pairs(path: str | Path) -> list[Pair]:
     DataError
         It cannot be read, has other columns, or a row without a name.
     """
-    name = shown(path)
-    try:
-        rows = list(csv.DictReader(io.StringIO(read_text(Path(path)))))
-    except (OSError, csv.Error) as error:
-        raise DataError(f"{name}: {error}") from error
-    if not rows or not {"events", "film"} <= set(rows[0]):
-        raise DataError(f"{name}: needs the columns events and film, and a row for each recording")
-    pairs: list[Pair] = []
-    for number, row in enumerate(rows, start=2):
-        if not row["events"] or not row["film"]:
-            raise DataError(f"{name}, line {number}: needs a file of events and a film")
-        folder = Path(path).parent
-        pairs.append((folder / row["events"].strip(), folder / row["film"].strip()))
-    return pairs
+    table = read_table(path)
+    for name in ("events", "film"):
+        if name not in table.columns:
+            raise DataError(f"{table.name}: needs the columns events and film")
+        for row, text in enumerate(table.texts(name)):
+            if not text:
+                raise table.wrong(row, name, "must be the name of a file")
+    folder = Path(path).parent
+    pairs = zip(table.texts("events"), table.texts("film"), strict=True)
+    return [(folder / events, folder / film) for events, film in pairs]
 
 
 def read_recordings(

@@ -255,8 +255,8 @@ def test_recordings_of_one_law_are_near_and_thinned_ones_are_not():
     ("text", "wrong"),
     [
         ("a,b\n1,2\n", "needs the columns events and film"),
-        ("events,film\n", "needs the columns events and film"),
-        ("events,film\nx.h5,\n", "line 2: needs a file of events and a film"),
+        ("events,film\n", "there are no rows below the header"),
+        ("events,film\nx.h5,\n", "csv:2: film: is empty, must be the name of a file"),
     ],
 )
 def test_a_table_of_films_that_is_none(tmp_path, text, wrong):
@@ -268,8 +268,8 @@ def test_a_table_of_films_that_is_none(tmp_path, text, wrong):
 @pytest.mark.parametrize(
     ("arguments", "wrong"),
     [
-        (["a.h5", "b.h5"], "takes one RECORDING at a time"),
-        (["a.h5", "b.h5", "--films", "a.csv"], "takes one RECORDING at a time"),
+        (["a.h5", "b.h5"], "2 recordings are given: one is diagnosed"),
+        (["a.h5", "b.h5", "--films", "a.csv"], "--films: its table names the events"),
         ([], "0 recordings are given"),
         (["a.h5", "--film", "a.png", "--light", "b.csv"], "--light and --film: give one of them"),
         (["--film", "a.png"], "--film: give the recordings"),
