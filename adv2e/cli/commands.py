@@ -62,5 +62,7 @@ class Command(click.Command):
         if extra and not ctx.resilient_parsing:
             _, *usage = ctx.command.get_usage(ctx).split()
             hint = "; an output is put behind -o" if "output" in ctx.params else ""
+            if ctx.info_name == "convert":
+                hint += ", and 'adv2e batch' takes a folder of inputs"
             raise UsageError(f"unexpected argument '{extra[0]}': {' '.join(usage)}{hint}")
         return extra
