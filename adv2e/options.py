@@ -386,7 +386,22 @@ class Content(TypedDict, total=False):
     ]
 
 
-class OutputOptions(Content, total=False):
+class SideInput(TypedDict, total=False):
+    """Option of what an input has beside frames and events."""
+
+    side: Annotated[
+        "str | Path | None",
+        Option(
+            help="Take poses, IMU, calibration, boxes, masks, depth and flow from this folder or"
+            " zip. none: carry none along.",
+            usual="from the input itself, or INPUT.side beside it",
+            metavar="FOLDER|none",
+            completes="files",
+        ),
+    ]
+
+
+class OutputOptions(Content, SideInput, total=False):
     """Options of a file of events that is written."""
 
     format: Annotated[
@@ -759,7 +774,7 @@ EXPORTS = {"voxel": VoxelOptions, "ev-segnet": SegmentationOptions, "e2vid": Tra
 """Options of each kind of export, by its name."""
 
 
-class ExportOptions(EventInput, Run, total=False):
+class ExportOptions(EventInput, SideInput, Run, total=False):
     """Options of any export; those of its kind are in :data:`EXPORTS`."""
 
     overwrite: Overwrite
@@ -787,6 +802,14 @@ class BatchOptions(AnyFrames, Part, Clock, Content, Run, total=False):
     ]
     window_us: WindowUs
     bins: Bins
+    side: Annotated[
+        "str | None",
+        Option(
+            help="none: carry no poses, IMU, calibration, boxes, masks, depth and flow along.",
+            usual="those of each sequence, as 'adv2e convert' finds them",
+            choices=("none",),
+        ),
+    ]
     jobs: Annotated[
         "int | None",
         Option(

@@ -18,18 +18,18 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1470,
-    "batches": 1340,
+    "": 1480,
+    "batches": 1350,
     "cli": 1300,
     "comparison": 1165,
     "compilation": 285,
     "config": 1305,
-    "conversion": 1190,
+    "conversion": 1260,
     "diagnosis": 8230,
     "effects": 1548,
-    "exporting": 470,
-    "files": 780,
-    "formats": 5055,
+    "exporting": 480,
+    "files": 785,
+    "formats": 5100,
     "inspection": 260,
     "kernel": 5940,
     "light": 865,
@@ -39,12 +39,13 @@ LIMITS = {
     "rendering": 740,
     "reports": 1800,
     "representations": 112,
-    "sources": 3610,
+    "side": 755,
+    "sources": 3645,
     "synthetic": 160,
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 324
+FILES = 331
 """Most modules of all packages together."""
 
 _SLACK = 60

@@ -15,7 +15,7 @@ _GROUPS = {
     "Input": (
         *("fps", "timestamps", "time_unit", "track", "start", "stop", "start_s", "stop_s", "crop"),
         *("rotate180", "bayer", "pixel_format", "allow_damaged", "take"),
-        *("set_back", "crop_events"),
+        *("set_back", "crop_events", "side"),
         "light",
     ),
     "Sensor and pixel": (

@@ -7,12 +7,14 @@ With one thread, that one does everything.
 
 from __future__ import annotations
 
+import math
 import platform
 import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,6 +32,7 @@ from adv2e.conversion.simulation import events_from_light
 from adv2e.effects.frames.brightness import check_white
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Frames
+from adv2e.errors import UsageError
 from adv2e.events import Events
 from adv2e.files.regular import shown
 from adv2e.files.staging import Staging
@@ -42,6 +45,8 @@ from adv2e.light.pictures import drawn, picture_white
 from adv2e.light.sensor import fitting_of
 from adv2e.options import SimulatedOutput, takes
 from adv2e.process import bars
+from adv2e.side.carrying import SideData, find_side
+from adv2e.side.placement import Clock, Placement
 from adv2e.sources import STDIN
 from adv2e.sources.base import Source
 
@@ -202,6 +207,8 @@ def convert_reading(
     width, height = frames if fitting is None else fitting.size
     # events and preview come into place together, when all is written
     inputs = (*reading.inputs, *also_read)
+    side = _side_of(recording, config, fitting, options["side"], doubt)
+    clock = partial(_clock_of, recording, config)
     with Staging(options["overwrite"], inputs) as staging, ExitStack() as stack:
         sink = stack.enter_context(
             open_sink(
@@ -220,6 +227,7 @@ def convert_reading(
                 threads=workers,
                 staging=staging,
                 causes=causes,
+                side=None if side is None or target == "-" else side.files(clock, doubt),
             )
         )
         # a write to standard output may block until the reader pleases, and only the main thread
@@ -272,6 +280,8 @@ def convert_reading(
         log(f"frames in between are made by {network.text}")
     for note in recording.notes:
         log(note)
+    if side is not None:
+        log("standard output holds no side data" if target == "-" else side.told())
     if found:
         doubt(found)
     return Summary(
@@ -305,6 +315,49 @@ def decoding_of(recording: Source, config: Config) -> tuple[LightDecoder, Fittin
     )
     frames = Size(recording.width, recording.height)
     return decoder, fitting_of(*frames, config.sensor, recording.path, recording.along)
+
+
+def _side_of(
+    recording: Source,
+    config: Config,
+    fitting: Fitting | None,
+    given: str | Path | None,
+    doubt: Callable[[str], None],
+) -> SideData | None:
+    """Return the side data of a source, if there are any; see :func:`find_side`."""
+    if recording.along is not None:
+        if given not in (None, "none"):
+            raise UsageError("--side: a picture before which the sensor moves has no side data")
+        return None
+    chosen = recording.selection
+    place = Placement.of(
+        recording.whole,
+        Size(recording.width, recording.height) if fitting is None else fitting.size,
+        turned=chosen.rotate180,
+        crop=chosen.crop,
+        fit=None if fitting is None else fitting.placement(),
+        shift_px=config.frames.shift_px,
+    )
+    return find_side(recording.path, given, place, doubt)
+
+
+def _clock_of(recording: Source, config: Config) -> Clock:
+    """Return the way from the clock of a source whose frames were read to that of the events."""
+    frames = np.array(recording.passed_ns, np.int64)
+    chosen = recording.selection
+    begin = int(frames[0]) + chosen.start_ns
+    own, names = recording.own_times_ns(), recording.names()
+    return Clock(
+        frames=frames,
+        names=names[: len(frames)],
+        own=None if own is None else np.array(own[: len(frames)], np.int64),
+        first=int(frames[np.searchsorted(frames, begin)]),
+        begin=begin if chosen.start_ns else -math.inf,
+        end=frames[0] + chosen.stop_ns,
+        zero=recording.origin_ns,
+        offset_us=config.frames.clock_offset_us,
+        drift_ppm=config.frames.clock_drift_ppm,
+    )
 
 
 def _doubt_of_white(recording: Source, largest: float | None, config: Config) -> str:

@@ -61,6 +61,12 @@ def seconds(t_ns: int) -> str:
     return sign + (f"{whole}.{part:09d}".rstrip("0").rstrip("."))
 
 
+def nine_decimals(t_ns: int) -> str:
+    """Return a time [ns] in seconds with nine decimals, exactly."""
+    whole, rest = divmod(abs(int(t_ns)), NS_PER_S)
+    return f"{'-' if t_ns < 0 else ''}{whole}.{rest:09d}"
+
+
 Rate = float | Fraction | str
 """A frame rate [Hz]: 30, 29.97, or exactly ``30000/1001``."""
 
