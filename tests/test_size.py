@@ -39,7 +39,7 @@ LIMITS = {
     "rendering": 740,
     "reports": 1800,
     "representations": 112,
-    "side": 755,
+    "side": 740,
     "sources": 3645,
     "synthetic": 160,
 }

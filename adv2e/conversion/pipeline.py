@@ -329,15 +329,7 @@ def _side_of(
         if given not in (None, "none"):
             raise UsageError("--side: a picture before which the sensor moves has no side data")
         return None
-    chosen = recording.selection
-    place = Placement.of(
-        recording.whole,
-        Size(recording.width, recording.height) if fitting is None else fitting.size,
-        turned=chosen.rotate180,
-        crop=chosen.crop,
-        fit=None if fitting is None else fitting.placement(),
-        shift_px=config.frames.shift_px,
-    )
+    place = Placement.of(recording.whole, recording.selection, fitting, config.frames.shift_px)
     return find_side(recording.path, given, place, doubt)
 
 

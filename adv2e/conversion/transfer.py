@@ -146,9 +146,7 @@ def side_of(
     file: EventFile, given: str | Path | None, doubt: Callable[[str], None]
 ) -> SideData | None:
     """Return the side data of an event file, of which events were asked for in order."""
-    chosen, whole = file.facts.selection, Size(*file.facts.whole)
-    size = whole if chosen.crop is None else Size(chosen.crop.width, chosen.crop.height)
-    place = Placement.of(whole, size, turned=chosen.rotate180, crop=chosen.crop)
+    place = Placement.of(Size(*file.facts.whole), file.facts.selection)
     return find_side(file.facts.path, given, place, doubt)
 
 

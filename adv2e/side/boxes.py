@@ -28,7 +28,7 @@ import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +76,6 @@ class Boxes:
     shares: bool = False
     classes: Mapping[int, str] = field(default_factory=dict)
     sizes: frozenset[Size] = frozenset()
-    kind: ClassVar[str] = "boxes"
 
     def placed(self, place: Placement, clock: Clock) -> tuple[NDArray[Any], NDArray[np.int64]]:
         """Return the boxes on the sensor, (boxes,) PROPHESEE, and their times [ns], in order."""

@@ -27,7 +27,7 @@ import yaml
 
 from adv2e.errors import DataError
 from adv2e.geometry import Size
-from adv2e.side.placement import Placement
+from adv2e.side.placement import Clock, Placement
 
 _FEWEST = 4  # fx fy cx cy, or with four or five numbers of the distortion
 _OF_TEXT = (4, 8, 9)
@@ -63,7 +63,7 @@ class Calibration:
         found = [*self.intrinsics[:-_FEWEST], *scaled.tolist(), *middle.tolist()]
         return replace(self, intrinsics=found, distortion=bent)
 
-    def files(self, place: Placement) -> Iterator[tuple[str, bytes]]:
+    def written(self, place: Placement, clock: Clock) -> Iterator[tuple[str, bytes]]:
         """Yield names and bytes of the files for the sensor."""
         made = self.placed(place)
         if self.model == "pinhole" and (self.bends in _RADTAN or not any(self.distortion)):

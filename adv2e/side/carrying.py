@@ -9,15 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
+from typing import Protocol
 
 from adv2e.errors import DataError
 from adv2e.files.regular import beside, shown
 from adv2e.files.zips import Members
 from adv2e.formats.writing import SIDE
 from adv2e.side import boxes, maps
-from adv2e.side.calibration import Calibration, parse_calibration
+from adv2e.side.calibration import parse_calibration
 from adv2e.side.placement import Clock, Placement
-from adv2e.side.tables import Table, parse_table
+from adv2e.side.tables import parse_table
 from adv2e.sources.images.source import natural_key
 from adv2e.sources.times.lists import decoded
 
@@ -42,7 +43,6 @@ _FOLDERS = {
 _LABELS = "labels"  # of YOLO
 """Places of each kind in a folder, in the order in which they are looked for."""
 
-_WRITTEN = {"poses": "groundtruth", "imu": "imu", "accelerometer": "accelerometer"}
 _INSIDE = ("data", "cam0", "cam1", "mav0", "rgb", "img", "images", "frames", "image")
 """Folders of frames within that of a sequence."""
 
@@ -59,14 +59,26 @@ _LIKELY = ("", ".txt", ".csv", ".yaml", ".yml", ".json", ".npy", ".npz", ".bag",
 Tell = Callable[[str], None]
 
 
+class Kind(Protocol):
+    """Side data of a kind, as they were read."""
+
+    def written(self, place: Placement, clock: Clock) -> Iterator[tuple[str, bytes]]:
+        """Yield name and bytes of each file; DataError, at last, for what cannot be carried."""
+        ...
+
+
 @dataclass
 class SideData:
     """Side data of an input, as they were read.
 
     Attributes
     ----------
+    place : Placement
+        Where the frames lie on the sensor.
+    kinds : dict
+        What was read of each kind, by its name.
     labels : dict
-        Where each kind was found.
+        Where each was found.
     rest : list of str
         Names of what is in the input and is not carried.
     doubts : list of str
@@ -74,10 +86,7 @@ class SideData:
     """
 
     place: Placement
-    tables: dict[str, Table] = field(default_factory=dict)
-    calibration: Calibration | None = None
-    boxes: boxes.Boxes | None = None
-    maps: list[maps.Maps] = field(default_factory=list)
+    kinds: dict[str, Kind] = field(default_factory=dict)
     labels: dict[str, str] = field(default_factory=dict)
     rest: list[str] = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
@@ -88,20 +97,12 @@ class SideData:
         `clock` is called once the frames are read.
         """
         known = clock()
-        for kind, table in self.tables.items():
-            text = table.lines(known)
-            if not text:
-                tell(f"{self.labels[kind]}: none of its times is in the part that is converted")
-            yield f"{_WRITTEN.get(kind, kind)}.txt", text.encode()
-        if self.calibration is not None:
-            yield from self.calibration.files(self.place)
-        kinds: list[maps.Maps | boxes.Boxes] = [*self.maps]
-        for one in kinds if self.boxes is None else [*kinds, self.boxes]:
+        for name, kind in self.kinds.items():
             try:
-                yield from one.written(self.place, known)
+                yield from kind.written(self.place, known)
             except DataError as error:  # noqa: PERF203 - the others are carried
                 tell(f"{error}: not carried")
-                del self.labels[one.kind]
+                del self.labels[name]
 
     def told(self) -> str:
         """Return what is carried, in a line for people."""
@@ -219,34 +220,35 @@ class _Names:
 def _read(kind: str, names: _Names, found: SideData) -> None:
     """Add what there is of a kind to what was found."""
     files, place = names.files, found.place
+    made: Kind | None = None
     name = next(filter(files.has, _PLACES.get(kind, ())), "")
     label = files.label(name or _LABELS)
     if kind == "calibration" and name:
-        found.calibration = parse_calibration(names.text(name), label)
-        found.calibration.placed(place)
+        made = calibration = parse_calibration(names.text(name), label)
+        calibration.placed(place)
     elif kind == "boxes":
-        inside = names.within(_LABELS, (".txt",))
+        boxed: boxes.Boxes | None = None
         if name:
-            found.boxes = _BOXES[PurePosixPath(name).suffix](files.read(name), label)
-        elif inside:
+            made = boxed = _BOXES[PurePosixPath(name).suffix](files.read(name), label)
+        elif inside := names.within(_LABELS, (".txt",)):
             name, known = _LABELS, [one for one in inside if not one.endswith("classes.txt")]
-            found.boxes = boxes.of_yolo({one: files.read(one) for one in known}, label)
-        for size in found.boxes.sizes if found.boxes else ():
+            made = boxed = boxes.of_yolo({one: files.read(one) for one in known}, label)
+        for size in boxed.sizes if boxed else ():
             place.check(size, label)
     elif kind in _PLACES and name:
-        found.tables[kind] = parse_table(names.text(name), label, kind)
-        found.doubts += found.tables[kind].told
+        made = table = parse_table(names.text(name), label, kind)
+        found.doubts += table.told
     for folder in _FOLDERS.get(kind, ()):
         if inside := names.within(folder, maps.SUFFIXES):
-            name, made = folder, maps.Maps(kind, files.label(folder), inside, files.read)
-            made.map_of(inside[0], place)
+            name, mapped = folder, maps.Maps(kind, files.label(folder), inside, files.read)
+            mapped.map_of(inside[0], place)
             lists = (f"{kind}.txt", f"{folder}.txt", f"{folder}_timestamps.txt")
             if listed := next(filter(files.has, lists), None):
-                made = _by_list(made, listed, names, found.doubts)
-            found.maps.append(made)
+                mapped = _by_list(mapped, listed, names, found.doubts)
+            made = mapped
             break
-    if name:
-        found.labels[kind] = name
+    if made is not None:
+        found.kinds[kind], found.labels[kind] = made, name
 
 
 _BOXES = {".json": boxes.of_coco, ".txt": boxes.of_mot, ".npy": boxes.of_prophesee}

@@ -25,6 +25,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from adv2e.errors import DataError
 from adv2e.geometry import Rectangle, Size
+from adv2e.light.sensor import Fitting
+from adv2e.sources.base import Selection
 
 Times = NDArray[np.int64]
 
@@ -56,20 +58,21 @@ class Placement:
     def of(
         cls,
         whole: Size,
-        size: Size,
-        *,
-        turned: bool,
-        crop: Rectangle | None,
-        fit: dict[str, Any] | None = None,
+        chosen: Selection,
+        fitting: Fitting | None = None,
         shift_px: tuple[float, float] = (0.0, 0.0),
     ) -> Placement:
-        """Return the placement by what was done to frames; `fit` as `Fitting.placement` has it."""
-        fit = fit or {"scale": (1.0, 1.0), "origin": (0.0, 0.0)}
-        scale = tuple(map(float, fit["scale"]))
-        corner = (crop.x, crop.y) if crop else (0, 0)
-        each = zip(corner, fit["origin"], shift_px, scale, strict=True)
-        origin = tuple(begin + place + shift / by for begin, place, shift, by in each)
-        return cls(whole, size, turned, (scale[0], scale[1]), (origin[0], origin[1]))
+        """Return the placement of frames of which a part is chosen, and fitted to the sensor."""
+        crop = chosen.crop or Rectangle(0, 0, *whole)
+        size, scale, origin = Size(crop.width, crop.height), (1.0, 1.0), (0.0, 0.0)
+        if fitting is not None:
+            told = fitting.placement()
+            size, scale, origin = fitting.size, tuple(told["scale"]), tuple(told["origin"])
+        x, y = (
+            begin + place + shift / by
+            for begin, place, shift, by in zip(crop[:2], origin, shift_px, scale, strict=True)
+        )
+        return cls(whole, size, chosen.rotate180, scale, (x, y))
 
     def points(self, points: ArrayLike) -> NDArray[np.float64]:
         """Return where points (..., 2) of the frame lie on the sensor, from its corner [px]."""

@@ -18,14 +18,14 @@ rig: they do not turn with the frames.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 
 import numpy as np
 
 from adv2e.errors import DataError
-from adv2e.side.placement import Clock
+from adv2e.side.placement import Clock, Placement
 from adv2e.sources.times.rates import NUMBER, SETTLED, UNITS, frame_unit, nine_decimals, parse_ns
 
 COLUMNS = {
@@ -55,6 +55,8 @@ class Table:
 
     Attributes
     ----------
+    kind, label : str
+        One of :data:`COLUMNS`, and the file.
     times : list of tuple of int
         One of each line, or, of exposures, two [ns].
     values : list of str
@@ -63,21 +65,32 @@ class Table:
         What is to be told of it.
     """
 
+    kind: str
+    label: str
     times: list[tuple[int, ...]]
     values: list[str]
     told: list[str]
 
-    def lines(self, clock: Clock) -> str:
-        """Return the lines that are wanted, on the clock of the events."""
+    def written(self, place: Placement, clock: Clock) -> Iterator[tuple[str, bytes]]:
+        """Yield name and bytes of the lines that are wanted, on the clock of the events.
+
+        Raises
+        ------
+        DataError
+            None is wanted.
+        """
         pairs = [clock.of(column) for column in np.array(self.times, np.int64).T]
         wanted = np.all([inside for _, inside in pairs], axis=0)
         stamps = zip(*(times.tolist() for times, _ in pairs), strict=True)
-        rows = zip(stamps, self.values, wanted, strict=True)
-        return "".join(
+        lines = "".join(
             " ".join([*map(nine_decimals, times), *filter(None, [rest])]) + "\n"
-            for times, rest, is_in in rows
+            for times, rest, is_in in zip(stamps, self.values, wanted, strict=True)
             if is_in
         )
+        if not lines:
+            raise DataError(f"{self.label}: none of its times is in the part that is converted")
+        name = "groundtruth" if self.kind == "poses" else self.kind
+        yield f"{name}.txt", lines.encode()
 
 
 def parse_table(text: str, label: str, kind: str) -> Table:
@@ -113,7 +126,7 @@ def parse_table(text: str, label: str, kind: str) -> Table:
     left = [re.sub(r"\[.*", "", word) for word in left if not _COUNTS.fullmatch(word)]
     if left:
         told.append(f"{label}: columns that are not carried: {', '.join(left)}")
-    return Table(times, values, told)
+    return Table(kind, label, times, values, told)
 
 
 def unit_of(times: Sequence[str], stated: str | None, label: str) -> tuple[int, list[str]]:

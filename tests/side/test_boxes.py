@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.geometry import Rectangle, Size
+from adv2e.geometry import Size
 from adv2e.side.boxes import of_coco, of_mot, of_prophesee, of_yolo
 from adv2e.side.placement import Clock, Placement
 
@@ -57,7 +57,7 @@ def test_what_is_written_is_read_again():
 
 
 def test_a_box_is_cut_where_the_sensor_ends():
-    place = Placement.of(WHOLE, Size(20, 10), turned=False, crop=Rectangle(20, 15, 20, 10))
+    place = Placement(WHOLE, Size(20, 10), origin=(20.0, 15.0))
     boxes = of_mot(b"1,1,11,21,30,15,1,0\n1,2,1,1,15,10,1,0\n", "a")
     assert rows(boxes, place) == [(1000, 0, 5, 20, 5, 0, 1, 1)]
 

@@ -5,10 +5,11 @@ import pytest
 import yaml
 
 from adv2e.errors import DataError
-from adv2e.geometry import Rectangle, Size
+from adv2e.geometry import Size
 from adv2e.side.calibration import parse_calibration
-from adv2e.side.placement import Placement
+from adv2e.side.placement import Clock, Placement
 
+NOW = Clock(np.zeros(0, np.int64))
 WHOLE = Size(752, 480)
 SENSOR = """%YAML:1.0
 # General sensor definitions.
@@ -39,10 +40,8 @@ def project(point, numbers):
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_point_of_the_world_falls_where_its_light_falls(turned):
-    crop = Rectangle(30, 20, 600, 400)
-    fit = {"scale": (0.5, 0.25), "origin": (4.0, -8.0)}
-    place = Placement.of(WHOLE, Size(296, 104), turned=turned, crop=crop, fit=fit)
-    files = dict(parse_calibration(SENSOR, "sensor.yaml").files(place))
+    place = Placement(WHOLE, Size(296, 104), turned, (0.5, 0.25), (34.0, 12.0))
+    files = dict(parse_calibration(SENSOR, "sensor.yaml").written(place, NOW))
     before = [458.654, 457.296, 367.215, 248.375, -0.28340811, 0.07395907, 0.00019359]
     before += [1.76187114e-05, 0]
     after = np.array(files["calib.txt"].split(), float)
@@ -56,14 +55,16 @@ def test_a_point_of_the_world_falls_where_its_light_falls(turned):
         x, y = project(np.linalg.solve(old, body), before) + 0.5
         if turned:
             x, y = 752 - x, 480 - y
-        there = (x - 30 - 4) * 0.5, (y - 20 + 8) * 0.25
+        there = (x - 34) * 0.5, (y - 12) * 0.25
         assert project(np.linalg.solve(new, body), after) + 0.5 == pytest.approx(there, abs=1e-6)
 
 
 def test_what_has_no_text_keeps_its_yaml():
     text = SENSOR.replace("radial-tangential", "equidistant")
     place = Placement(WHOLE, WHOLE)
-    assert [name for name, _ in parse_calibration(text, "a.yaml").files(place)] == ["sensor.yaml"]
+    assert [name for name, _ in parse_calibration(text, "a.yaml").written(place, NOW)] == [
+        "sensor.yaml"
+    ]
 
 
 def test_a_chain_of_kalibr_gives_its_first_camera():
@@ -71,8 +72,8 @@ def test_a_chain_of_kalibr_gives_its_first_camera():
     chain["cam0"] |= {"distortion_coeffs": [1, 2, 3, 4], "distortion_model": "radtan"}
     chain["cam0"]["T_cam_imu"] = np.diag([1.0, 2, 3, 1]).tolist()
     found = parse_calibration(yaml.safe_dump(chain), "camchain.yaml")
-    place = Placement.of(Size(64, 48), Size(64, 48), turned=True, crop=None)
-    told = yaml.safe_load(dict(found.files(place))["sensor.yaml"])
+    place = Placement(Size(64, 48), Size(64, 48), turned=True)
+    told = yaml.safe_load(dict(found.written(place, NOW))["sensor.yaml"])
     assert told["intrinsics"] == [1.5, 80, 81, 33, 27]
     assert told["distortion_coeffs"] == [1, 2, -3, -4]
     assert np.diag(told["T_cam_imu"]).tolist() == [-1, -2, 3, 1]

@@ -46,13 +46,7 @@ def test_flow_that_is_not_known_stays_so():
 
 
 def test_flow_scales_and_turns_with_the_frames():
-    place = Placement.of(
-        Size(4, 3),
-        Size(8, 12),
-        turned=True,
-        crop=None,
-        fit={"scale": (2.0, 4.0), "origin": (0.0, 0.0)},
-    )
+    place = Placement(Size(4, 3), Size(8, 12), turned=True, scale=(2.0, 4.0))
     made = Maps("flow", "flow", ["a.npy", "b.npy"], lambda name: npy(FLOW))
     files = dict(made.written(place, CLOCK))
     grown = np.repeat(np.repeat(FLOW[::-1, ::-1], 4, 0), 2, 1) * (-2, -4)

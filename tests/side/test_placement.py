@@ -11,6 +11,7 @@ from sequences import HEIGHT, LINEAR, STEP_NS, WIDTH, expected, found, middle, p
 from adv2e import convert, read_events
 from adv2e.geometry import Rectangle, Size
 from adv2e.side.placement import Clock, Placement
+from adv2e.sources.base import Selection
 
 COUNT = 4
 
@@ -173,13 +174,11 @@ def test_a_cut_leaves_what_lies_within(tmp_path):
 
 
 def test_nearest_points_outside_the_frame_are_filled():
-    place = Placement.of(
-        Size(4, 2), Size(4, 4), turned=False, crop=None, fit={"scale": (1, 1), "origin": (0, -1)}
-    )
+    place = Placement(Size(4, 2), Size(4, 4), origin=(0.0, -1.0))
     taken = place.taken(np.arange(1, 9).reshape(2, 4))
     assert taken.tolist() == [[0] * 4, [1, 2, 3, 4], [5, 6, 7, 8], [0] * 4]
     assert place.points((1, 1)).tolist() == [1, 2]
-    cut = Placement.of(Size(4, 2), Size(2, 1), turned=True, crop=Rectangle(1, 1, 2, 1))
+    cut = Placement.of(Size(4, 2), Selection(crop=Rectangle(1, 1, 2, 1), rotate180=True))
     assert cut.taken(np.arange(1, 9).reshape(2, 4)).tolist() == [[3, 2]]
 
 

@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 from adv2e.errors import DataError
-from adv2e.side.placement import Clock
+from adv2e.geometry import Size
+from adv2e.side.placement import Clock, Placement
 from adv2e.side.tables import parse_table
 
 NOW = Clock(np.zeros(0, np.int64))
+
+PLACE = Placement(Size(4, 3), Size(4, 3))
 
 EUROC_IMU = (
     "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
@@ -34,6 +37,17 @@ TUM = (
 DAVIS_IMU = "0.001 -0.09 9.57 -0.24 -1.4e-3 0.02 0.03\n0.002 -0.08 9.5 -0.2 0.1 0.2 0.3\n"
 
 
+def written(text, kind):
+    ((_, data),) = parse_table(text, "a.txt", kind).written(PLACE, NOW)
+    return data.decode()
+
+
+def test_a_part_without_any_is_told():
+    later = Clock(np.zeros(0, np.int64), begin=10**10)
+    with pytest.raises(DataError, match="none of its times is in the part"):
+        list(parse_table(DAVIS_IMU, "a.txt", "imu").written(PLACE, later))
+
+
 @pytest.mark.parametrize(
     ("text", "kind", "mark", "unit", "order"),
     [
@@ -47,7 +61,7 @@ DAVIS_IMU = "0.001 -0.09 9.57 -0.24 -1.4e-3 0.02 0.03\n0.002 -0.08 9.5 -0.2 0.1 
     ids=["euroc-imu", "euroc-poses", "uzh-imu", "tum", "davis-imu", "tum-accelerometer"],
 )
 def test_a_data_set_is_read_as_numpy_reads_it(text, kind, mark, unit, order, tmp_path):
-    (tmp_path / "out.txt").write_text(parse_table(text, "a.txt", kind).lines(NOW))
+    (tmp_path / "out.txt").write_text(written(text, kind))
     rows = [line for line in text.splitlines() if not line.startswith("#")]
     known = np.loadtxt(rows, delimiter=mark, ndmin=2)
     made = np.loadtxt(tmp_path / "out.txt", ndmin=2)
@@ -63,7 +77,7 @@ def test_a_data_set_is_read_as_numpy_reads_it(text, kind, mark, unit, order, tmp
 
 def test_exposures_have_two_times():
     text = "# exposure_start_timestamp_us, exposure_end_timestamp_us\n49599300523, 49599315524\n"
-    assert parse_table(text, "a", "exposures").lines(NOW) == "49599.300523000 49599.315524000\n"
+    assert written(text, "exposures") == "49599.300523000 49599.315524000\n"
 
 
 def test_what_is_left_out_is_told():
