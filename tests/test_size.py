@@ -23,10 +23,10 @@ LIMITS = {
     "cli": 1300,
     "comparison": 1165,
     "compilation": 285,
-    "config": 1305,
+    "config": 1310,
     "conversion": 1260,
     "diagnosis": 8230,
-    "effects": 1548,
+    "effects": 1560,
     "exporting": 480,
     "files": 785,
     "formats": 5100,
@@ -40,7 +40,7 @@ LIMITS = {
     "reports": 1800,
     "representations": 112,
     "side": 740,
-    "sources": 3645,
+    "sources": 3680,
     "synthetic": 160,
 }
 """Most lines of code of each package; of the modules beside them as ""."""

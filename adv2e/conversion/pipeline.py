@@ -13,7 +13,7 @@ import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -193,6 +193,10 @@ def convert_reading(
     began = time.perf_counter()
     doubt = doubt or log
     recording, workers = reading.source, reading.threads
+    exposures_us = recording.exposures_us
+    if exposures_us:  # in the place of one for all
+        mean_us = float(np.mean(exposures_us))
+        config = replace(config, frames=replace(config.frames, exposure_us=mean_us))
     decoder, fitting = decoding_of(recording, config)
     format, layout, causes = options["format"], options["layout"], options["causes"]
     target = output or default_output(reading.path, format)
@@ -206,8 +210,9 @@ def convert_reading(
     frames = Size(recording.width, recording.height)
     width, height = frames if fitting is None else fitting.size
     # events and preview come into place together, when all is written
-    inputs = (*reading.inputs, *also_read)
-    side = _side_of(recording, config, fitting, options["side"], doubt)
+    given = options["side"]
+    inputs = (*reading.inputs, *also_read, *([] if given in (None, "none") else [given]))
+    side = _side_of(recording, config, fitting, given, doubt)
     clock = partial(_clock_of, recording, config)
     with Staging(options["overwrite"], inputs) as staging, ExitStack() as stack:
         sink = stack.enter_context(
@@ -239,7 +244,7 @@ def convert_reading(
         told = _doubt_of_white(recording, recording.largest, config)
         for text in filter(None, (*recording.doubts, told)):
             doubt(text)
-        hooks = active_hooks(config)
+        hooks = active_hooks(config, exposures_us=exposures_us)
         table = kernel_table(decoder, config.sampling, hooks, fitting)
         stated = config.frames.full_scale
         decoded = reading.decoded(
@@ -280,6 +285,8 @@ def convert_reading(
         log(f"frames in between are made by {network.text}")
     for note in recording.notes:
         log(note)
+    if exposures_us:
+        log(f"exposures of {min(exposures_us):g} to {max(exposures_us):g} us are those of the list")
     if side is not None:
         log("standard output holds no side data" if target == "-" else side.told())
     if found:

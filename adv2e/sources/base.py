@@ -87,6 +87,8 @@ class Source(ABC):
         It may hold several tracks, and chooses among them itself.
     waits : bool
         Reading waits for others, and for ever if they please: it belongs in the main thread.
+    exposures_us : list of float
+        Exposure of each frame that `frames` yields [us]; empty where they are not known.
     passed_ns : array of int
         Times of all frames that `frames` looked at, wanted or not, on the source's clock [ns].
     origin_ns : int
@@ -114,6 +116,7 @@ class Source(ABC):
         self.packages: tuple[str, ...] = ()
         self.waits = False
         self.ended_by_hand: int | None = None
+        self.exposures_us: list[float] = []
         self.passed_ns = array("q")
         self.origin_ns = 0
         self.along: SensorPath | None = None

@@ -128,7 +128,7 @@ def _listed(
     else:
         raise _other_number(label, len(stamps), len(pictures), path)
     shots = [
-        Shot(stamp.t_ns, pictures[at].label, pictures[at].load)
+        Shot(stamp.t_ns, pictures[at].label, pictures[at].load, stamp.exposure_ns)
         for stamp, at in zip(stamps, places, strict=True)
     ]
     return Timed(shots, doubts, notes)
@@ -203,8 +203,14 @@ class ListedSource(Source):
             )
         first_ns = self._shots[0].t_ns
         chosen = self.selection
-        inside = (chosen.start_ns <= s.t_ns - first_ns <= chosen.stop_ns for s in self._shots)
-        self.count = sum(inside)
+        inside = [
+            shot
+            for shot in self._shots
+            if chosen.start_ns <= shot.t_ns - first_ns <= chosen.stop_ns
+        ]
+        self.count = len(inside)
+        if any(shot.exposure_ns for shot in inside):
+            self.exposures_us = [shot.exposure_ns / 1000 for shot in inside]
         if self.count < 2:
             raise self._too_few(self.count, self._shots[-1].t_ns - first_ns)
 

@@ -31,11 +31,12 @@ NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 
 @dataclass(frozen=True)
 class Stamp:
-    """One line of a list of times."""
+    """One line of a list of times; with an exposure, its middle is the time."""
 
     t_ns: int
     line: int
     name: str | None
+    exposure_ns: int = 0
 
 
 def parse_ns(text: str, unit_ns: int = NS_PER_S) -> int:
