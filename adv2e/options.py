@@ -401,6 +401,20 @@ class SideInput(TypedDict, total=False):
     ]
 
 
+class Blurred(TypedDict, total=False):
+    """Option of the frames that are written beside events."""
+
+    blurred_frames: Annotated[
+        "int | None",
+        Option(
+            help="Also write blurred frames, for sets of deblurring: each is the mean of the light"
+            " from a frame to the N-th behind it.",
+            kind="count",
+            metavar="N",
+        ),
+    ]
+
+
 class OutputOptions(Content, SideInput, total=False):
     """Options of a file of events that is written."""
 
@@ -419,7 +433,7 @@ class OutputOptions(Content, SideInput, total=False):
     overwrite: Overwrite
 
 
-class SimulatedOutput(OutputOptions, total=False):
+class SimulatedOutput(OutputOptions, Blurred, total=False):
     """Options of the output of a simulation."""
 
     preview: Annotated[
@@ -784,7 +798,7 @@ LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "images", "videos")
 """Trees of sequences that a batch knows."""
 
 
-class BatchOptions(AnyFrames, Part, Clock, Content, Run, total=False):
+class BatchOptions(AnyFrames, Part, Clock, Content, Blurred, Run, total=False):
     """Options of a batch."""
 
     layout: Annotated[str, Option(help="Which sequences count.", default="auto", choices=LAYOUTS)]

@@ -18,13 +18,13 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1480,
+    "": 1490,
     "batches": 1350,
     "cli": 1300,
     "comparison": 1165,
     "compilation": 285,
     "config": 1310,
-    "conversion": 1260,
+    "conversion": 1325,
     "diagnosis": 8230,
     "effects": 1560,
     "exporting": 480,
@@ -32,20 +32,20 @@ LIMITS = {
     "formats": 5100,
     "inspection": 260,
     "kernel": 5940,
-    "light": 865,
-    "motion": 350,
+    "light": 890,
+    "motion": 370,
     "pixel": 575,
     "process": 265,
     "rendering": 740,
     "reports": 1800,
     "representations": 112,
-    "side": 740,
+    "side": 800,
     "sources": 3680,
     "synthetic": 160,
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 331
+FILES = 332
 """Most modules of all packages together."""
 
 _SLACK = 60

@@ -24,6 +24,7 @@ _GROUPS = {
     ),
     "Output": (
         *("output", "overwrite", "format", "layout", "t0", "with_frames", "preview", "causes"),
+        "blurred_frames",
         "as_json",
     ),
     "Running": ("threads", "jobs", "shard", "scheduler", "dry_run", "progress", "quiet"),

@@ -16,6 +16,7 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,12 +33,12 @@ from adv2e.conversion.simulation import events_from_light
 from adv2e.effects.frames.brightness import check_white
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Frames
-from adv2e.errors import UsageError
+from adv2e.errors import DataError, UsageError
 from adv2e.events import Events
 from adv2e.files.regular import shown
-from adv2e.files.staging import Staging
+from adv2e.files.staging import Staging, nearest_there, writing
 from adv2e.formats.registry import check_frames, to_write
-from adv2e.formats.writing import PACKAGES, Sink, open_sink
+from adv2e.formats.writing import PACKAGES, SideFiles, Sink, open_sink
 from adv2e.geometry import Size
 from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.interpolation import network_of
@@ -45,7 +46,9 @@ from adv2e.light.pictures import drawn, picture_white
 from adv2e.light.sensor import fitting_of
 from adv2e.options import SimulatedOutput, takes
 from adv2e.process import bars
+from adv2e.side.blurred import BlurredFrames
 from adv2e.side.carrying import SideData, find_side
+from adv2e.side.maps import Maps
 from adv2e.side.placement import Clock, Placement
 from adv2e.sources import STDIN
 from adv2e.sources.base import Source
@@ -53,6 +56,7 @@ from adv2e.sources.base import Source
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
+    from adv2e.light.interpolation.flow import GivenFlow
     from adv2e.light.sensor import Fitting
     from adv2e.rendering.timeline import Timeline
 
@@ -102,10 +106,16 @@ class _Output:
     """Output of frames and events, by `work`: to the sink and the preview, if any; with counts."""
 
     def __init__(
-        self, sink: Sink, preview: Timeline | None, white: float, work: OrderedWork
+        self,
+        sink: Sink,
+        preview: Timeline | None,
+        blurred: BlurredFrames | None,
+        white: float,
+        work: OrderedWork,
     ) -> None:
         self._sink, self._preview, self._white, self._work = sink, preview, white, work
-        self.wants_frames = sink.wants_frames or preview is not None
+        self._blurred = blurred
+        self.wants_frames = sink.wants_frames or preview is not None or blurred is not None
         self.frames = self.first_ns = self.last_ns = 0
         self.events = self.on = 0
 
@@ -135,6 +145,9 @@ class _Output:
 
     def _write_frame(self, t_ns: int, picture: NDArray[Any]) -> None:
         self._sink.write_frame(t_ns, picture)
+        if self._blurred is not None:
+            with writing("blurred frames"):
+                self._blurred.add(t_ns, picture)
         if self._preview is not None:
             self._preview.add_frame(t_ns, drawn(picture, self._white))
 
@@ -214,6 +227,17 @@ def convert_reading(
     inputs = (*reading.inputs, *also_read, *([] if given in (None, "none") else [given]))
     side = _side_of(recording, config, fitting, given, doubt)
     clock = partial(_clock_of, recording, config)
+    flow = _given_flow(recording, config, side)
+    blurred, count = None, options["blurred_frames"]
+    if count is not None:
+        if target == "-":
+            raise UsageError(
+                "--blurred-frames: standard output has no place for them: give -o FILE"
+            )
+        blurred = BlurredFrames(
+            count, decoder.encoding, white, nearest_there(Path(target).absolute())
+        )
+    files = _side_files(side, blurred, clock, doubt)
     with Staging(options["overwrite"], inputs) as staging, ExitStack() as stack:
         sink = stack.enter_context(
             open_sink(
@@ -232,7 +256,7 @@ def convert_reading(
                 threads=workers,
                 staging=staging,
                 causes=causes,
-                side=None if side is None or target == "-" else side.files(clock, doubt),
+                side=None if target == "-" else files,
             )
         )
         # a write to standard output may block until the reader pleases, and only the main thread
@@ -240,7 +264,7 @@ def convert_reading(
         beside = workers > 1 and target != "-"
         seen = _open_preview(preview, width, height, staging, stack)
         work = stack.enter_context(OrderedWork(int(beside), limit=BEHIND_BYTES, count=BEHIND_TASKS))
-        out = _Output(sink, seen, white, work)
+        out = _Output(sink, seen, blurred, white, work)
         told = _doubt_of_white(recording, recording.largest, config)
         for text in filter(None, (*recording.doubts, told)):
             doubt(text)
@@ -262,6 +286,7 @@ def convert_reading(
             table=table,
             complete=out.complete_until,
             causes=causes,
+            given=flow,
         )
         for events in chunks:
             out.add(events)
@@ -340,12 +365,60 @@ def _side_of(
     return find_side(recording.path, given, place, doubt)
 
 
+def _side_files(
+    side: SideData | None,
+    blurred: BlurredFrames | None,
+    clock: Callable[[], Clock],
+    doubt: Callable[[str], None],
+) -> SideFiles | None:
+    """Return the files that lie beside the events; None: there are none."""
+    if side is None and blurred is None:
+        return None
+    own = side.files(clock, doubt) if side is not None else ()
+    return chain(own, blurred.files(clock) if blurred is not None else ())
+
+
+def _given_flow(recording: Source, config: Config, side: SideData | None) -> GivenFlow | None:
+    """Return the flow that frames are moved along, by the number of the first that is simulated.
+
+    Raises
+    ------
+    DataError
+        It is asked for, and some of it is not there.
+    """
+    if config.sampling.interpolation != "given" or config.sampling.L == 1:
+        return None
+    kind, shots = None if side is None else side.kinds.get("flow"), recording.listed()
+    if side is None or not isinstance(kind, Maps) or not shots:
+        raise DataError(
+            f"{recording.path}: sampling.interpolation: given needs pictures, or a stack, with flow"
+            " beside them, such as flow/*.npy; or say flow, which finds it"
+        )
+    times, own = np.array([shot.t_ns for shot in shots], np.int64), recording.own_times_ns()
+    clock = Clock(
+        times, [shot.label for shot in shots], None if own is None else np.array(own, np.int64)
+    )
+    files = {
+        first: name
+        for (first, last), name in zip(kind.frames(clock).tolist(), kind.names, strict=False)
+        if last == first + 1
+    }
+    inside = (times - times[0] >= recording.selection.start_ns) & (
+        times - times[0] <= recording.selection.stop_ns
+    )
+    begin, *_, end = np.flatnonzero(inside).tolist()
+    missing = next((n for n in range(begin, end) if n not in files), None)
+    if missing is not None:
+        raise DataError(f"{kind.label}: no flow from {shots[missing].label} to the next frame")
+    return lambda number: kind.placed(files[begin + number], side.place)
+
+
 def _clock_of(recording: Source, config: Config) -> Clock:
     """Return the way from the clock of a source whose frames were read to that of the events."""
     frames = np.array(recording.passed_ns, np.int64)
     chosen = recording.selection
     begin = int(frames[0]) + chosen.start_ns
-    own, names = recording.own_times_ns(), recording.names()
+    own, names = recording.own_times_ns(), [shot.label for shot in recording.listed()]
     return Clock(
         frames=frames,
         names=names[: len(frames)],

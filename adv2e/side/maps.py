@@ -76,6 +76,32 @@ class Maps:
         place.check(Size(found.shape[1], found.shape[0]), f"{self.label}/{name}")
         return found
 
+    def placed(self, name: str, place: Placement) -> NDArray[Any]:
+        """Return a map on the sensor; DataError as :meth:`map_of`."""
+        found = self.map_of(name, place)
+        if self.kind != "flow":
+            return place.taken(found)
+        steps = np.array(place.scale, np.float32) * (-1 if place.turned else 1)
+        return place.taken(found, np.nan) * steps
+
+    def frames(self, clock: Clock) -> NDArray[np.int64]:
+        """Return the numbers of the frames that each is of, (files, 1), or (files, 2) of flow.
+
+        Raises
+        ------
+        DataError
+            They cannot be told.
+        """
+        ends = np.arange(2 if self.kind == "flow" else 1)
+        if self.times is None:
+            first = np.array(clock.numbers(self.names, self.label, len(ends) - 1), np.int64)
+            return first[:, np.newaxis] + ends
+        shown = clock.frames if clock.own is None else clock.own
+        apart = np.abs(self.times[..., np.newaxis] - shown)
+        if np.any(apart.min(-1) > np.diff(shown).min() / 4):
+            raise DataError(f"{self.label}: its times are not those of the frames")
+        return np.asarray(apart.argmin(-1), np.int64)
+
     def written(self, place: Placement, clock: Clock) -> Iterator[tuple[str, bytes]]:
         """Yield names and bytes of the maps on the sensor that are wanted, and of their list.
 
@@ -86,25 +112,19 @@ class Maps:
         """
         lines: list[str] = []
         wrong: list[str] = []
-        ends = 2 if self.kind == "flow" else 1
         if self.times is None:
-            first = np.array(clock.numbers(self.names, self.label, ends - 1), np.int64)
-            last = np.minimum(first[:, np.newaxis] + np.arange(ends), len(clock.frames) - 1)
+            last = np.minimum(self.frames(clock), len(clock.frames) - 1)
             times, wanted = clock.of_frames(last)
         else:
             times, wanted = clock.of(self.times)
         for number in np.flatnonzero(wanted.all(axis=1)).tolist():
             try:
-                found = self.map_of(self.names[number], place)
+                made = self.placed(self.names[number], place)
             except DataError as error:
                 wrong.append(str(error))
                 continue
             suffix = PurePosixPath(self.names[number]).suffix.lower()
-            if self.kind == "flow":
-                steps = np.array(place.scale, np.float32) * (-1 if place.turned else 1)
-                made, suffix = place.taken(found, np.nan) * steps, ".npy"
-            else:
-                made = place.taken(found)
+            suffix = ".npy" if self.kind == "flow" else suffix
             name = f"{self.kind}/{len(lines):08d}{suffix}"
             yield name, _encoded(made, suffix)
             lines.append(" ".join([*map(nine_decimals, times[number]), name]) + "\n")

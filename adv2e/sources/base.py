@@ -12,7 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from array import array
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -161,9 +161,9 @@ class Source(ABC):
         self.light = replace(light, full_scale=self.full_scale, full_scale_reason=why)
         self.encoding = light.encoding
 
-    def names(self) -> list[str]:
-        """Return the names of the files of the frames, in the order of time; none of a video."""
-        return []
+    def listed(self) -> Sequence[Shot]:
+        """Return all frames, in the order of time, where they are known before; else none."""
+        return ()
 
     def own_times_ns(self) -> list[int] | None:
         """Return the times of the frames that a rate replaces [ns]; None: there are none.

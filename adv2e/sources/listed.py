@@ -214,9 +214,9 @@ class ListedSource(Source):
         if self.count < 2:
             raise self._too_few(self.count, self._shots[-1].t_ns - first_ns)
 
-    def names(self) -> list[str]:
-        """Return the names of the files of the frames, in the order of time."""
-        return [shot.label for shot in self._shots]
+    def listed(self) -> Sequence[Shot]:
+        """Return all frames, in the order of time."""
+        return self._shots
 
     def own_times_ns(self) -> list[int] | None:
         """Return the times of the frames that a rate replaces [ns]; None: there are none."""

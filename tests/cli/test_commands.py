@@ -115,6 +115,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "overwrite": True,
         "preview": "p.gif",
         "side": None,
+        "blurred_frames": None,
         "causes": True,
         "progress": True,
         "also_read": [find("ideal")],
