@@ -39,7 +39,7 @@ LIMITS = {
     "rendering": 740,
     "reports": 1800,
     "representations": 112,
-    "side": 800,
+    "side": 805,
     "sources": 3680,
     "synthetic": 160,
 }

@@ -394,18 +394,13 @@ def _given_flow(recording: Source, config: Config, side: SideData | None) -> Giv
             f"{recording.path}: sampling.interpolation: given needs pictures, or a stack, with flow"
             " beside them, such as flow/*.npy; or say flow, which finds it"
         )
-    times, own = np.array([shot.t_ns for shot in shots], np.int64), recording.own_times_ns()
-    clock = Clock(
-        times, [shot.label for shot in shots], None if own is None else np.array(own, np.int64)
-    )
+    clock = _clock_of(recording, config)
     files = {
         first: name
         for (first, last), name in zip(kind.frames(clock).tolist(), kind.names, strict=False)
         if last == first + 1
     }
-    inside = (times - times[0] >= recording.selection.start_ns) & (
-        times - times[0] <= recording.selection.stop_ns
-    )
+    inside = (clock.frames >= clock.begin) & (clock.frames <= clock.end)
     begin, *_, end = np.flatnonzero(inside).tolist()
     missing = next((n for n in range(begin, end) if n not in files), None)
     if missing is not None:
@@ -414,15 +409,17 @@ def _given_flow(recording: Source, config: Config, side: SideData | None) -> Giv
 
 
 def _clock_of(recording: Source, config: Config) -> Clock:
-    """Return the way from the clock of a source whose frames were read to that of the events."""
-    frames = np.array(recording.passed_ns, np.int64)
-    chosen = recording.selection
+    """Return the way from the clock of a source to that of the events, once its frames are read.
+
+    Frames that are known before are all in it at once, but for the zero of the events' clock.
+    """
+    shots, own, chosen = recording.listed(), recording.own_times_ns(), recording.selection
+    frames = np.array([shot.t_ns for shot in shots] or recording.passed_ns, np.int64)
     begin = int(frames[0]) + chosen.start_ns
-    own, names = recording.own_times_ns(), [shot.label for shot in recording.listed()]
     return Clock(
         frames=frames,
-        names=names[: len(frames)],
-        own=None if own is None else np.array(own[: len(frames)], np.int64),
+        names=[shot.label for shot in shots],
+        own=None if own is None else np.array(own, np.int64),
         first=int(frames[np.searchsorted(frames, begin)]),
         begin=begin if chosen.start_ns else -math.inf,
         end=frames[0] + chosen.stop_ns,

@@ -43,8 +43,11 @@ _FOLDERS = {
 _LABELS = "labels"  # of YOLO
 """Places of each kind in a folder, in the order in which they are looked for."""
 
-_INSIDE = ("data", "cam0", "cam1", "mav0", "rgb", "img", "images", "frames", "image")
-"""Folders of frames within that of a sequence."""
+_INSIDE = {
+    **{"data": "data.csv", "rgb": "rgb.txt", "img": "left_images.txt", "images": "images.txt"},
+    **{"cam0": "cam0/data.csv", "cam1": "cam1/data.csv", "mav0": "mav0"},
+}
+"""Folders of frames within that of a sequence, and what this then holds."""
 
 _FRAMES = (
     *("events.txt", "images.txt", "adv2e.json", "side.json", "images", "rgb", "rgb.txt", "img"),
@@ -179,9 +182,10 @@ def _roots(source: Path, given: str | Path | None) -> Iterator[Members]:
     whole = source.absolute()
     while source.is_dir():
         yield Members(whole)
-        if whole.name not in _INSIDE:
+        above = whole.parent
+        if whole.name not in _INSIDE or not (above / _INSIDE[whole.name]).exists():
             return
-        whole = whole.parent
+        whole = above
 
 
 class _Names:

@@ -113,8 +113,9 @@ class Maps:
         lines: list[str] = []
         wrong: list[str] = []
         if self.times is None:
-            last = np.minimum(self.frames(clock), len(clock.frames) - 1)
-            times, wanted = clock.of_frames(last)
+            numbers, last = self.frames(clock), len(clock.frames) - 1
+            times, wanted = clock.of_frames(np.minimum(numbers, last))
+            wanted &= numbers <= last
         else:
             times, wanted = clock.of(self.times)
         for number in np.flatnonzero(wanted.all(axis=1)).tolist():

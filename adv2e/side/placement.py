@@ -158,12 +158,15 @@ class Clock:
         told = [number for number in found if number is not None]
         if told and len(told) == len(found):
             return told
-        if len(names) in (len(self.frames), len(self.frames) - short_by) or (
-            len(names) > len(self.frames) and math.isfinite(self.end)  # not all frames were read
-        ):
-            return list(range(min(len(names), len(self.frames) - short_by)))
+        count = len(self.frames) - short_by
+        # of a video, no more frames are read than are wanted
+        more = not self.names and math.isfinite(self.end) and len(names) > count
+        if not told and (more or len(names) in (len(self.frames), count)):
+            return list(range(min(len(names), count)))
+        other = next((name for name, number in zip(names, found, strict=True) if number is None))
         raise DataError(
-            f"{label}: {len(names)} files for {len(self.frames)} frames, and not of their names"
+            f"{label}: {len(names)} files for {len(self.frames)} frames, and {other} has the name"
+            " of none"
         )
 
     def _on_frames(self, times: Times) -> Times:

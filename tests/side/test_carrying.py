@@ -141,7 +141,7 @@ def test_what_cannot_be_carried_is_named_and_the_rest_is(euroc, tmp_path):
     lines = converted(euroc, tmp_path / "out.h5", doubts=True)
     assert f"{euroc}: not carried: mav0/body.yaml, mav0/imu0, mav0/leica0" in lines
     assert any("imu0/data.csv: 2 columns that no heading tells" in line for line in lines)
-    assert any("masks: 1 files for 6 frames" in line for line in lines)
+    assert any("masks: 1 files for 6 frames, and " in line for line in lines)
     (line,) = carried(lines)
     assert "masks" not in line
     side = tmp_path / "out.h5.side"

@@ -66,6 +66,27 @@ def test_masks_and_depth_keep_their_numbers(array):
         assert files[f"{kind}.txt"].startswith(b"0.000000030 ")  # c.png is the third frame
 
 
+def test_files_that_are_of_no_frame_are_not_taken_for_those_of_others():
+    """Of four frames, the first two have no mask; nor has a part of them others than the whole."""
+    names = [f"{n}.png" for n in range(4)]
+    for end in (np.inf, 25):
+        clock = Clock(np.arange(0, 40, 10, dtype=np.int64), names, end=end)
+        made = Maps("masks", "m", ["2.png", "3.png"], lambda name: png(np.eye(3, 4)))
+        lines = dict(made.written(SAME, clock))["masks.txt"].decode().splitlines()
+        assert lines[0] == "0.000000020 masks/00000000.png"
+        assert len(lines) == (2 if end == np.inf else 1)
+        made = Maps("masks", "m", ["2.png", "4.png"], made.read)
+        with pytest.raises(
+            DataError, match=r"2 files for 4 frames, and 4\.png has"
+        ):
+            list(made.written(SAME, clock))
+
+
+def test_flow_of_the_last_frame_leads_nowhere():
+    made = Maps("flow", "flow", ["a.npy", "b.npy", "c.npy"], lambda name: npy(FLOW))
+    assert len(dict(made.written(SAME, CLOCK))["flow.txt"].splitlines()) == 2
+
+
 def test_times_of_a_list_count():
     names, times, told = listed("# t name\n30.5 depth/b.png\n0.5 depth/a.png\n", "depth.txt", 1)
     assert names == ["depth/a.png", "depth/b.png"]
