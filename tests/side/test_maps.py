@@ -76,9 +76,7 @@ def test_files_that_are_of_no_frame_are_not_taken_for_those_of_others():
         assert lines[0] == "0.000000020 masks/00000000.png"
         assert len(lines) == (2 if end == np.inf else 1)
         made = Maps("masks", "m", ["2.png", "4.png"], made.read)
-        with pytest.raises(
-            DataError, match=r"2 files for 4 frames, and 4\.png has"
-        ):
+        with pytest.raises(DataError, match=r"2 files for 4 frames, and 4\.png has"):
             list(made.written(SAME, clock))
 
 
