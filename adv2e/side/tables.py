@@ -6,7 +6,7 @@ written                 a line of it                          read of
 ``groundtruth.txt``     ``t px py pz qx qy qz qw``            TUM RGB-D, EuRoC, UZH-FPV, DAVIS240C
 ``imu.txt``             ``t ax ay az gx gy gz``               EuRoC, UZH-FPV, DAVIS240C
 ``accelerometer.txt``   ``t ax ay az``                        TUM RGB-D
-``exposures.txt``       ``start end`` of each frame           DSEC, EVDI
+``exposures.txt``       ``start end`` of each frame           DSEC
 ======================= ===================================== ==================================
 
 Times are written in seconds with nine decimals; all other numbers stay as they were written.  A
