@@ -386,7 +386,36 @@ class Content(TypedDict, total=False):
     ]
 
 
-class OutputOptions(Content, total=False):
+class SideInput(TypedDict, total=False):
+    """Option of what an input has beside frames and events."""
+
+    side: Annotated[
+        "str | Path | None",
+        Option(
+            help="Take poses, IMU, calibration, boxes, masks, depth and flow from this folder or"
+            " zip. none: carry none along.",
+            usual="from the input itself, or INPUT.side beside it",
+            metavar="FOLDER|none",
+            completes="files",
+        ),
+    ]
+
+
+class Blurred(TypedDict, total=False):
+    """Option of the frames that are written beside events."""
+
+    blurred_frames: Annotated[
+        "int | None",
+        Option(
+            help="Also write blurred frames, for sets of deblurring: each is the mean of the light"
+            " from a frame to the N-th behind it.",
+            kind="count",
+            metavar="N",
+        ),
+    ]
+
+
+class OutputOptions(Content, SideInput, total=False):
     """Options of a file of events that is written."""
 
     format: Annotated[
@@ -404,7 +433,7 @@ class OutputOptions(Content, total=False):
     overwrite: Overwrite
 
 
-class SimulatedOutput(OutputOptions, total=False):
+class SimulatedOutput(OutputOptions, Blurred, total=False):
     """Options of the output of a simulation."""
 
     preview: Annotated[
@@ -759,7 +788,7 @@ EXPORTS = {"voxel": VoxelOptions, "ev-segnet": SegmentationOptions, "e2vid": Tra
 """Options of each kind of export, by its name."""
 
 
-class ExportOptions(EventInput, Run, total=False):
+class ExportOptions(EventInput, SideInput, Run, total=False):
     """Options of any export; those of its kind are in :data:`EXPORTS`."""
 
     overwrite: Overwrite
@@ -769,7 +798,7 @@ LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "images", "videos")
 """Trees of sequences that a batch knows."""
 
 
-class BatchOptions(AnyFrames, Part, Clock, Content, Run, total=False):
+class BatchOptions(AnyFrames, Part, Clock, Content, Blurred, Run, total=False):
     """Options of a batch."""
 
     layout: Annotated[str, Option(help="Which sequences count.", default="auto", choices=LAYOUTS)]
@@ -787,6 +816,14 @@ class BatchOptions(AnyFrames, Part, Clock, Content, Run, total=False):
     ]
     window_us: WindowUs
     bins: Bins
+    side: Annotated[
+        "str | None",
+        Option(
+            help="none: carry no poses, IMU, calibration, boxes, masks, depth and flow along.",
+            usual="those of each sequence, as 'adv2e convert' finds them",
+            choices=("none",),
+        ),
+    ]
     jobs: Annotated[
         "int | None",
         Option(

@@ -18,33 +18,34 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1470,
-    "batches": 1340,
+    "": 1490,
+    "batches": 1350,
     "cli": 1300,
     "comparison": 1165,
     "compilation": 285,
-    "config": 1309,
-    "conversion": 1190,
+    "config": 1315,
+    "conversion": 1320,
     "diagnosis": 8320,
     "effects": 1615,
-    "exporting": 470,
-    "files": 780,
-    "formats": 5055,
+    "exporting": 480,
+    "files": 785,
+    "formats": 5100,
     "inspection": 260,
     "kernel": 5940,
-    "light": 865,
-    "motion": 350,
+    "light": 890,
+    "motion": 370,
     "pixel": 575,
     "process": 265,
     "rendering": 740,
     "reports": 1800,
     "representations": 112,
-    "sources": 3610,
+    "side": 805,
+    "sources": 3680,
     "synthetic": 160,
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 325
+FILES = 333
 """Most modules of all packages together."""
 
 _SLACK = 60

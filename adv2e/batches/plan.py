@@ -10,7 +10,7 @@ from typing import Any
 
 from adv2e import __version__
 from adv2e.batches.sequences import Sequence as Found
-from adv2e.batches.work import Export
+from adv2e.batches.work import Export, side_of
 from adv2e.errors import UsageError
 from adv2e.files.states import State, digest_of
 
@@ -141,6 +141,8 @@ def _why(
         return "it goes to another file"
     if record["source"] != asdict(state) and digest_of(sequence.source) != record["source_sha256"]:
         return "its source changed"
+    if record.get("side") != side_of(sequence.source):
+        return "its side data changed"
     if not output.exists():
         return "its file is gone"
     if digest_of(output) != record["sha256"]:

@@ -387,6 +387,7 @@ def open_batch(
         "format": options["format"],
         "with_frames": options["with_frames"] or (export is not None and export.needs_frames),
         "causes": options["causes"],
+        **{name: options[name] for name in ("side", "blurred_frames") if options[name]},
     }
     suffix = next(iter(format.suffixes))
     files = tuple(map(str, effects))

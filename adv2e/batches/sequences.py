@@ -31,6 +31,7 @@ from pathlib import Path, PurePosixPath
 from adv2e.errors import DataError
 from adv2e.files.zips import Members
 from adv2e.formats.registry import format_of, may_hold_events
+from adv2e.formats.writing import SIDE
 from adv2e.sources import VIDEO_SUFFIXES, open_source
 from adv2e.sources.davis240c import is_recording
 from adv2e.sources.gopro import find_sequence
@@ -152,7 +153,7 @@ class _Walk:
             folders[:] = sorted(
                 one
                 for one in folders
-                if not one.startswith(".")
+                if not (one.startswith(".") or one.endswith(SIDE))
                 and (self._avoided is None or (here / one).resolve() != self._avoided)
             )
             shown = sorted(name for name in names if not name.startswith("."))

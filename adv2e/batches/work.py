@@ -16,6 +16,7 @@ from adv2e.files.staging import Staging, writing
 from adv2e.files.states import State, digest_of
 from adv2e.formats.registry import to_write
 from adv2e.process.machine import machine_complaint
+from adv2e.side.carrying import places_of
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def _reported(job: Job, error_key: str, work: Callable[[Job], dict[str, Any]]) -
 def _convert(job: Job) -> dict[str, Any]:
     from adv2e.conversion.convert import convert  # noqa: PLC0415 - in the process that converts
 
-    source = digest_of(Path(job.source))
+    source, side = digest_of(Path(job.source)), side_of(Path(job.source))
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always")
         made = convert(
@@ -109,6 +110,7 @@ def _convert(job: Job) -> dict[str, Any]:
         )
     return {
         "source_sha256": source,
+        **({"side": side} if side else {}),
         "sha256": digest_of(Path(job.output)),
         "beside": {path.name: digest_of(path) for path in _beside(job)},
         "events": made.events,
@@ -119,6 +121,11 @@ def _convert(job: Job) -> dict[str, Any]:
     }
 
 
+def side_of(source: Path) -> dict[str, str] | None:
+    """Return the SHA-256 of the side data that lie outside a source; None without any."""
+    return {str(path): digest_of(path) for path in places_of(source)} or None
+
+
 def _told(warned: Iterable[warnings.WarningMessage]) -> Iterator[str]:
     """Yield the texts of warnings for users, without those of libraries about our code."""
     return (str(one.message) for one in warned if is_for_users(one.message, one.filename))
@@ -126,7 +133,9 @@ def _told(warned: Iterable[warnings.WarningMessage]) -> Iterator[str]:
 
 def _beside(job: Job) -> Iterator[Path]:
     """Yield the files that lie beside the output, of formats that have no place for all."""
+    from adv2e.files.regular import beside as beside_of  # noqa: PLC0415
     from adv2e.formats.causes import beside  # noqa: PLC0415
+    from adv2e.formats.writing import SIDE  # noqa: PLC0415
 
     output = Path(job.output)
     format = to_write(output, job.options.get("format"))
@@ -134,6 +143,8 @@ def _beside(job: Job) -> Iterator[Path]:
         yield output.with_name(f"{output.name}.json")
     if job.options.get("causes") and not format.causes:
         yield beside(output)
+    if (side := beside_of(output, SIDE)).is_dir():
+        yield side
 
 
 def _export(job: Job) -> dict[str, Any]:

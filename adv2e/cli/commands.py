@@ -10,7 +10,7 @@ _GROUPS = {
     "Input": (
         *("fps", "timestamps", "time_unit", "track", "start", "stop", "start_s", "stop_s", "crop"),
         *("rotate180", "bayer", "pixel_format", "allow_damaged", "take"),
-        *("set_back", "crop_events"),
+        *("set_back", "crop_events", "side"),
         "light",
     ),
     "Sensor and pixel": (
@@ -19,6 +19,7 @@ _GROUPS = {
     ),
     "Output": (
         *("output", "overwrite", "format", "layout", "t0", "with_frames", "preview", "causes"),
+        "blurred_frames",
         "as_json",
     ),
     "Running": ("threads", "jobs", "shard", "scheduler", "dry_run", "progress", "quiet"),

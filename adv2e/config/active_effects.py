@@ -23,15 +23,17 @@ from adv2e.effects.readout.frame_coupling import FrameCouplingHooks
 from adv2e.effects.readout.timestamp_tick import TimestampTickHooks
 
 
-def active_hooks(config: Config, extra: Sequence[Hooks] = ()) -> list[Hooks]:
+def active_hooks(
+    config: Config, extra: Sequence[Hooks] = (), exposures_us: Sequence[float] = ()
+) -> list[Hooks]:
     """Return the effects that are on in `config`, and the `extra` ones besides, in signal order.
 
     Those that are not the package's own follow its own of their stage, in the order given; the
-    tick of the time stamps is the last of all.
+    tick of the time stamps is the last of all.  `exposures_us`: see :func:`frame_hooks`.
     """
     extra = [*user_hooks(config), *extra]
     own: dict[str, Iterable[Hooks]] = {
-        "frames": frame_hooks(config.frames, config.sampling),
+        "frames": frame_hooks(config.frames, config.sampling, exposures_us),
         "pixel": _pixel_hooks(config.pixel),
         "readout": _readout_hooks(config.readout, config.frames) if config.readout else [],
     }
@@ -43,8 +45,13 @@ def active_hooks(config: Config, extra: Sequence[Hooks] = ()) -> list[Hooks]:
     return hooks
 
 
-def frame_hooks(frames: Frames, sampling: Sampling) -> Iterator[Hooks]:
-    """Yield the effects on the light of the frames, in signal order."""
+def frame_hooks(
+    frames: Frames, sampling: Sampling, exposures_us: Sequence[float] = ()
+) -> Iterator[Hooks]:
+    """Yield the effects on the light of the frames, in signal order.
+
+    `exposures_us` are those of the frames, where they are known of each.
+    """
     if frames.clock_drift_ppm:
         yield ClockDriftHooks(frames.clock_drift_ppm)
     if frames.clock_offset_us:
@@ -53,9 +60,9 @@ def frame_hooks(frames: Frames, sampling: Sampling) -> Iterator[Hooks]:
         # imported late: few conversions need it, and all would load its compiled loops
         from adv2e.effects.frames.motion_blur import MotionBlurHooks  # noqa: PLC0415
 
-        yield MotionBlurHooks(frames.exposure_us)
+        yield MotionBlurHooks(frames.exposure_us, exposures_us)
     elif frames.exposure_us:
-        yield ExposureBlurHooks(frames.exposure_us)
+        yield ExposureBlurHooks(frames.exposure_us, exposures_us)
     # after the frames are sharp: over a pedestal the dark would hardly become so in as many steps
     if frames.black_level_dn or frames.black_depth_dn:
         yield BlackLevelHooks(frames.black_level_dn, frames.black_depth_dn)

@@ -33,7 +33,7 @@ from adv2e.geometry import MOST_PIXELS
 from adv2e.kernel import rng
 from adv2e.parameters import Fit, Section, parameter, subsection
 
-INTERPOLATIONS = ("linear", "flow", "onnx")
+INTERPOLATIONS = ("linear", "flow", "given", "onnx")
 FITS = ("crop", "pad", "stretch", "none")
 MOST_COLUMNS = 1 << 16
 """Columns, or rows, that the coordinates of events can name."""
@@ -153,7 +153,7 @@ class Sampling(Section):
         "linear",
         unit="-",
         meaning="how in-between frames are made: linear blends them, flow moves them along the"
-        " motion, onnx asks a network",
+        " motion, given along flow that lies beside the frames, onnx asks a network",
         choices=INTERPOLATIONS,
     )
     model: str | None = parameter(

@@ -173,6 +173,7 @@ def convert_input(
 
 _SIMULATED = (
     *("fps", "timestamps", "allow_damaged", "bayer", "pixel_format", "motion", "preview"),
+    "blurred_frames",
 )
 """Options that say how frames are simulated."""
 

@@ -7,13 +7,16 @@ With one thread, that one does everything.
 
 from __future__ import annotations
 
+import math
 import platform
 import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,11 +33,12 @@ from adv2e.conversion.simulation import events_from_light
 from adv2e.effects.frames.brightness import check_white
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Frames
+from adv2e.errors import DataError, UsageError
 from adv2e.events import Events
 from adv2e.files.regular import shown
-from adv2e.files.staging import Staging
+from adv2e.files.staging import Staging, nearest_there, writing
 from adv2e.formats.registry import check_frames, to_write
-from adv2e.formats.writing import PACKAGES, Sink, open_sink
+from adv2e.formats.writing import PACKAGES, SideFiles, Sink, open_sink
 from adv2e.geometry import Size
 from adv2e.light.decoding import decoder_for, kernel_table, light_text
 from adv2e.light.interpolation import network_of
@@ -42,12 +46,17 @@ from adv2e.light.pictures import drawn, picture_white
 from adv2e.light.sensor import fitting_of
 from adv2e.options import SimulatedOutput, takes
 from adv2e.process import bars
+from adv2e.side.blurred import BlurredFrames
+from adv2e.side.carrying import SideData, find_side
+from adv2e.side.maps import Maps
+from adv2e.side.placement import Clock, Placement
 from adv2e.sources import STDIN
 from adv2e.sources.base import Source
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
+    from adv2e.light.interpolation.flow import GivenFlow
     from adv2e.light.sensor import Fitting
     from adv2e.rendering.timeline import Timeline
 
@@ -97,10 +106,16 @@ class _Output:
     """Output of frames and events, by `work`: to the sink and the preview, if any; with counts."""
 
     def __init__(
-        self, sink: Sink, preview: Timeline | None, white: float, work: OrderedWork
+        self,
+        sink: Sink,
+        preview: Timeline | None,
+        blurred: BlurredFrames | None,
+        white: float,
+        work: OrderedWork,
     ) -> None:
         self._sink, self._preview, self._white, self._work = sink, preview, white, work
-        self.wants_frames = sink.wants_frames or preview is not None
+        self._blurred = blurred
+        self.wants_frames = sink.wants_frames or preview is not None or blurred is not None
         self.frames = self.first_ns = self.last_ns = 0
         self.events = self.on = 0
 
@@ -130,6 +145,9 @@ class _Output:
 
     def _write_frame(self, t_ns: int, picture: NDArray[Any]) -> None:
         self._sink.write_frame(t_ns, picture)
+        if self._blurred is not None:
+            with writing("blurred frames"):
+                self._blurred.add(t_ns, picture)
         if self._preview is not None:
             self._preview.add_frame(t_ns, drawn(picture, self._white))
 
@@ -188,6 +206,10 @@ def convert_reading(
     began = time.perf_counter()
     doubt = doubt or log
     recording, workers = reading.source, reading.threads
+    exposures_us = recording.exposures_us
+    if exposures_us:  # in the place of one for all
+        mean_us = float(np.mean(exposures_us))
+        config = replace(config, frames=replace(config.frames, exposure_us=mean_us))
     decoder, fitting = decoding_of(recording, config)
     format, layout, causes = options["format"], options["layout"], options["causes"]
     target = output or default_output(reading.path, format)
@@ -201,7 +223,21 @@ def convert_reading(
     frames = Size(recording.width, recording.height)
     width, height = frames if fitting is None else fitting.size
     # events and preview come into place together, when all is written
-    inputs = (*reading.inputs, *also_read)
+    given = options["side"]
+    inputs = (*reading.inputs, *also_read, *([] if given in (None, "none") else [given]))
+    side = _side_of(recording, config, fitting, given, doubt)
+    clock = partial(_clock_of, recording, config)
+    flow = _given_flow(recording, config, side)
+    blurred, count = None, options["blurred_frames"]
+    if count is not None:
+        if target == "-":
+            raise UsageError(
+                "--blurred-frames: standard output has no place for them: give -o FILE"
+            )
+        blurred = BlurredFrames(
+            count, decoder.encoding, white, nearest_there(Path(target).absolute())
+        )
+    files = _side_files(side, blurred, clock, doubt)
     with Staging(options["overwrite"], inputs) as staging, ExitStack() as stack:
         sink = stack.enter_context(
             open_sink(
@@ -220,6 +256,7 @@ def convert_reading(
                 threads=workers,
                 staging=staging,
                 causes=causes,
+                side=None if target == "-" else files,
             )
         )
         # a write to standard output may block until the reader pleases, and only the main thread
@@ -227,11 +264,11 @@ def convert_reading(
         beside = workers > 1 and target != "-"
         seen = _open_preview(preview, width, height, staging, stack)
         work = stack.enter_context(OrderedWork(int(beside), limit=BEHIND_BYTES, count=BEHIND_TASKS))
-        out = _Output(sink, seen, white, work)
+        out = _Output(sink, seen, blurred, white, work)
         told = _doubt_of_white(recording, recording.largest, config)
         for text in filter(None, (*recording.doubts, told)):
             doubt(text)
-        hooks = active_hooks(config)
+        hooks = active_hooks(config, exposures_us=exposures_us)
         table = kernel_table(decoder, config.sampling, hooks, fitting)
         stated = config.frames.full_scale
         decoded = reading.decoded(
@@ -249,6 +286,7 @@ def convert_reading(
             table=table,
             complete=out.complete_until,
             causes=causes,
+            given=flow,
         )
         for events in chunks:
             out.add(events)
@@ -272,6 +310,10 @@ def convert_reading(
         log(f"frames in between are made by {network.text}")
     for note in recording.notes:
         log(note)
+    if exposures_us:
+        log(f"exposures of {min(exposures_us):g} to {max(exposures_us):g} us are those of the list")
+    if side is not None:
+        log("standard output holds no side data" if target == "-" else side.told())
     if found:
         doubt(found)
     return Summary(
@@ -305,6 +347,86 @@ def decoding_of(recording: Source, config: Config) -> tuple[LightDecoder, Fittin
     )
     frames = Size(recording.width, recording.height)
     return decoder, fitting_of(*frames, config.sensor, recording.path, recording.along)
+
+
+def _side_of(
+    recording: Source,
+    config: Config,
+    fitting: Fitting | None,
+    given: str | Path | None,
+    doubt: Callable[[str], None],
+) -> SideData | None:
+    """Return the side data of a source, if there are any; see :func:`find_side`."""
+    if recording.along is not None:
+        if given not in (None, "none"):
+            raise UsageError("--side: a picture before which the sensor moves has no side data")
+        return None
+    place = Placement.of(recording.whole, recording.selection, fitting, config.frames.shift_px)
+    return find_side(recording.path, given, place, doubt)
+
+
+def _side_files(
+    side: SideData | None,
+    blurred: BlurredFrames | None,
+    clock: Callable[[], Clock],
+    doubt: Callable[[str], None],
+) -> SideFiles | None:
+    """Return the files that lie beside the events; None: there are none."""
+    if side is None and blurred is None:
+        return None
+    own = side.files(clock, doubt) if side is not None else ()
+    return chain(own, blurred.files(clock) if blurred is not None else ())
+
+
+def _given_flow(recording: Source, config: Config, side: SideData | None) -> GivenFlow | None:
+    """Return the flow that frames are moved along, by the number of the first that is simulated.
+
+    Raises
+    ------
+    DataError
+        It is asked for, and some of it is not there.
+    """
+    if config.sampling.interpolation != "given" or config.sampling.L == 1:
+        return None
+    kind, shots = None if side is None else side.kinds.get("flow"), recording.listed()
+    if side is None or not isinstance(kind, Maps) or not shots:
+        raise DataError(
+            f"{recording.path}: sampling.interpolation: given needs pictures, or a stack, with flow"
+            " beside them, such as flow/*.npy; or say flow, which finds it"
+        )
+    clock = _clock_of(recording, config)
+    files = {
+        first: name
+        for (first, last), name in zip(kind.frames(clock).tolist(), kind.names, strict=False)
+        if last == first + 1
+    }
+    inside = (clock.frames >= clock.begin) & (clock.frames <= clock.end)
+    begin, *_, end = np.flatnonzero(inside).tolist()
+    missing = next((n for n in range(begin, end) if n not in files), None)
+    if missing is not None:
+        raise DataError(f"{kind.label}: no flow from {shots[missing].label} to the next frame")
+    return lambda number: kind.placed(files[begin + number], side.place)
+
+
+def _clock_of(recording: Source, config: Config) -> Clock:
+    """Return the way from the clock of a source to that of the events, once its frames are read.
+
+    Frames that are known before are all in it at once, but for the zero of the events' clock.
+    """
+    shots, own, chosen = recording.listed(), recording.own_times_ns(), recording.selection
+    frames = np.array([shot.t_ns for shot in shots] or recording.passed_ns, np.int64)
+    begin = int(frames[0]) + chosen.start_ns
+    return Clock(
+        frames=frames,
+        names=[shot.label for shot in shots],
+        own=None if own is None else np.array(own, np.int64),
+        first=int(frames[np.searchsorted(frames, begin)]),
+        begin=begin if chosen.start_ns else -math.inf,
+        end=frames[0] + chosen.stop_ns,
+        zero=recording.origin_ns,
+        offset_us=config.frames.clock_offset_us,
+        drift_ppm=config.frames.clock_drift_ppm,
+    )
 
 
 def _doubt_of_white(recording: Source, largest: float | None, config: Config) -> str:

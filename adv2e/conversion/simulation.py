@@ -7,7 +7,7 @@ import math
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from contextlib import nullcontext
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,9 @@ from adv2e.process import bars
 from adv2e.sources.frame import Frame, check_values, light_of_images
 from adv2e.sources.times.rates import NS_PER_S, FrameRate, Rate, parse_rate
 from adv2e.ticks import check_time
+
+if TYPE_CHECKING:
+    from adv2e.light.interpolation.flow import GivenFlow
 
 _FAR_APART_S = 10.0
 """Frames so far apart are told: times in ms or us look like that."""
@@ -257,6 +260,7 @@ def events_from_light(
     coarseness: Coarseness = PRECISE,
     complete: Callable[[int], None] | None = None,
     causes: bool = False,
+    given: GivenFlow | None = None,
 ) -> Iterator[Events]:
     """Yield the events of a sequence of (t_ns, light [DN]), sorted, chunk by chunk.
 
@@ -264,7 +268,8 @@ def events_from_light(
     `table` (:func:`adv2e.light.pictures.kernel_table`), the frames are grey values of 8 bits that
     it decodes.  `coarseness`, `causes`: see :class:`adv2e.pixel.array.PixelArray`.
     `complete` is called now and then with a time [us] before which no event will come any more; not
-    so if effects change events, as they may change times.
+    so if effects change events, as they may change times.  `given`: see
+    :func:`adv2e.light.interpolation.make_upsampler`.
 
     Raises
     ------
@@ -283,6 +288,7 @@ def events_from_light(
         hooks,
         table,
         complete,
+        given,
         threads=threads,
         coarseness=coarseness,
         causes=causes,
@@ -312,6 +318,7 @@ def _pixel_events(
     hooks: Sequence[Hooks],
     table: NDArray[np.float32] | None,
     complete: Callable[[int], None] | None,
+    given: GivenFlow | None,
     **options: Any,
 ) -> Iterator[Events]:
     """Yield the sorted events of the pixels, as they are before the readout.
@@ -328,7 +335,7 @@ def _pixel_events(
         hooks=hooks,
         **options,
     )
-    intervals = Intervals(t_ns, first, config.sampling, threads=array.threads)
+    intervals = Intervals(t_ns, first, config.sampling, threads=array.threads, given=given)
     del first
     # the main thread cannot be interrupted in compiled code
     apart = array.threads > 1 or threading.current_thread() is threading.main_thread()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,13 +24,15 @@ from adv2e.errors import DataError
 from adv2e.files.regular import shown
 from adv2e.files.staging import Staging
 from adv2e.formats.event_file import EventFile
-from adv2e.formats.reading import events_in_order, open_events, shots_of
+from adv2e.formats.reading import events_in_order, open_events, shots_of, wanted_us
 from adv2e.formats.registry import check_frames, to_write
 from adv2e.formats.writing import PACKAGES, Sink, open_sink
 from adv2e.geometry import Size
 from adv2e.light.pictures import picture_of, picture_white
 from adv2e.options import CopyOptions, EventInput, chosen, crop_of, takes
 from adv2e.process.bars import share_bar
+from adv2e.side.carrying import SideData, find_side
+from adv2e.side.placement import Clock, Placement
 from adv2e.sources.frame import Frame, Light
 
 if TYPE_CHECKING:
@@ -87,6 +90,8 @@ def convert_events(
         crop = crop_of(options) or (0, 0, *size)
         origin_us = first_us if options["t0"] == "zero" else 0
         frames = file.shots is not None and (with_frames or keeps_all_bits)
+        side = side_of(file, options["side"], doubt or log)
+        clock = partial(clock_of, file, origin_us)
         with Staging(options["overwrite"], file.inputs) as staging, ExitStack() as stack:
             sink = stack.enter_context(
                 open_sink(
@@ -108,6 +113,7 @@ def convert_events(
                     threads=options["threads"],
                     staging=staging,
                     causes=causes,
+                    side=None if side is None or output == "-" else side.files(clock, doubt or log),
                 )
             )
             stored = _write_frames(file, Size(*size), origin_us, sink, keeps_all_bits)
@@ -121,6 +127,8 @@ def convert_events(
                 on += int(np.count_nonzero(chunk["p"]))
     for text in dict.fromkeys(facts.problems):
         (doubt or log)(f"{path}: {text}")
+    if side is not None:
+        log("standard output holds no side data" if output == "-" else side.told())
     return Summary(
         output=output,
         width=width,
@@ -131,6 +139,27 @@ def convert_events(
         on=on,
         seconds=time.perf_counter() - began,
         copied_from=path,
+    )
+
+
+def side_of(
+    file: EventFile, given: str | Path | None, doubt: Callable[[str], None]
+) -> SideData | None:
+    """Return the side data of an event file, of which events were asked for in order."""
+    place = Placement.of(Size(*file.facts.whole), file.facts.selection)
+    return find_side(file.facts.path, given, place, doubt)
+
+
+def clock_of(file: EventFile, origin_us: int = 0) -> Clock:
+    """Return the way from the clock of an event file to that of its events, from an origin on."""
+    begin_us, end_us = wanted_us(file)
+    shots = [] if file.shots is None else list(file.shots())
+    return Clock(
+        frames=np.array([shot.t_ns for shot in shots], np.int64),
+        names=[shot.label for shot in shots],
+        begin=begin_us * 1000 - 500,
+        end=end_us * 1000 + 499,
+        zero=origin_us * 1000,
     )
 
 

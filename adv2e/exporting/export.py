@@ -7,10 +7,12 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from collections.abc import Sequence as Many
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from adv2e import __version__
+from adv2e.conversion.transfer import clock_of, side_of
 from adv2e.errors import UsageError, warn
 from adv2e.exporting import e2vid, ev_segnet, voxels
 from adv2e.exporting.sequence import Sequence, open_sequences
@@ -24,6 +26,7 @@ from adv2e.exporting.voxels import (
 from adv2e.files.regular import shown
 from adv2e.files.staging import Staging, writing
 from adv2e.formats.reading import events_in_order
+from adv2e.formats.writing import write_side
 from adv2e.in_python import in_python
 from adv2e.options import EXPORTS, MOST_EMPTY, EventInput, ExportOptions, chosen, declared, takes
 
@@ -119,7 +122,10 @@ def export(
     """
     _check_kind(to, options)
     paths = [events] if isinstance(events, (str, Path)) else list(events)
+    if len(paths) > 1 and options["side"] not in (None, "none"):
+        raise UsageError("--side: is of one recording, and there are several: export one by one")
     how = {**chosen(EventInput, options), "overwrite": options["overwrite"], "doubt": doubt}
+    how["side"] = options["side"]
     if to == "e2vid":
         return export_e2vid(paths, output, options["valid"], options["threads"], **how)
     window_us = options["window_us"]
@@ -260,6 +266,7 @@ def _exported(
     *,
     overwrite: bool = False,
     doubt: Callable[[str], None] = lambda text: None,
+    side: str | Path | None = None,
     **reading: Any,
 ) -> Exported:
     """Let `write` fill a folder, which comes into place when all is there.
@@ -280,6 +287,8 @@ def _exported(
         Replace, at the end, an export that exists.
     doubt : callable
         Takes lines for people that ask for a look.
+    side : str or Path, optional
+        Where side data are, in place of the recordings; "none": none are written.
     **reading
         See :func:`adv2e.formats.reading.open_events`.
     """
@@ -292,6 +301,8 @@ def _exported(
         staging.prepare()
         folder.mkdir()
         items = write(sequences, folder, told)
+        for sequence in sequences:
+            _write_side(sequence, side, folder / "side" / sequence.name, told["doubts"].append)
         doubts = told.pop("doubts")
         entries = sorted([entry.name for entry in folder.iterdir()] + [DESCRIPTION])
         inputs = [
@@ -311,6 +322,15 @@ def _exported(
     for line in doubts:
         doubt(line)
     return Exported(str(output), len(sequences), items, what, time.perf_counter() - began)
+
+
+def _write_side(
+    sequence: Sequence, given: str | Path | None, folder: Path, tell: Callable[[str], None]
+) -> None:
+    """Write the side data of a recording, whose events were read, on the clock of its events."""
+    side = side_of(sequence.file, given, tell)
+    if side is not None:
+        write_side(folder, side.files(partial(clock_of, sequence.file), tell))
 
 
 def _slices(

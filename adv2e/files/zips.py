@@ -125,6 +125,15 @@ class Members:
             self._top = found[0][0]
         return [name for _, name in found]
 
+    def names(self, folder: str) -> list[str]:
+        """Return the names of what is in a folder, '' for all; none where there is no such."""
+        if self._archive is None:
+            place = self.path / folder
+            return sorted(one.name for one in place.iterdir()) if place.is_dir() else []
+        top = f"{self._top}{folder}/" if folder else self._top
+        rests = (name[len(top) :] for name in self.archived() if name.startswith(top))
+        return sorted({rest.partition("/")[0] for rest in rests})
+
     def has(self, name: str) -> bool:
         """Tell whether there is a file of that name, with the folders in which it is."""
         return self._top + name in self._names or (

@@ -51,12 +51,12 @@ from adv2e.files.zips import Members
 from adv2e.formats.event_file import EventFile, Facts
 from adv2e.formats.text import lines_of
 from adv2e.formats.text_writer import blocks_of, formatted, text_blocks
-from adv2e.formats.writing import Request, Writer, to_json
+from adv2e.formats.writing import Request, Writer, listed_side, to_json, write_side
 from adv2e.sources.frame import Frame, Shot
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST
 from adv2e.sources.times.lists import FrameList, decoded, has_lines, members_of, parse_list
-from adv2e.sources.times.rates import NS_PER_S
+from adv2e.sources.times.rates import nine_decimals
 
 
 def open_davis240c(path: Path, facts: Facts) -> EventFile:
@@ -126,12 +126,6 @@ _BLOCK = 1 << 20  # bytes of text deflated at once: the archive must not depend 
 _LEVEL = 4  # of deflate: a fifth more bytes than level 6, in a third of its time
 
 
-def _seconds(t_ns: int) -> str:
-    """Return a time [ns] in seconds with nine decimals, exactly."""
-    whole, rest = divmod(abs(t_ns), NS_PER_S)
-    return f"{'-' if t_ns < 0 else ''}{whole}.{rest:09d}"
-
-
 def _png(image: NDArray[Any]) -> bytes:
     done, data = cv2.imencode(".png", image)
     assert done
@@ -142,7 +136,7 @@ class _Davis240cWriter(Writer):
     """Base of the writers of folder and archive: names and list of the frames."""
 
     def __init__(self, request: Request, stack: ExitStack) -> None:
-        self._description = request.description
+        self._description, self._side = request.description, request.side
         self._work = OrderedWork(request.threads - 1)
         stack.callback(self._work.abandon)
         self._lines: list[str] = []
@@ -150,7 +144,7 @@ class _Davis240cWriter(Writer):
     def write_frame(self, t_ns: int, image: NDArray[Any]) -> None:
         """Append a frame."""
         name = f"images/frame_{len(self._lines):08d}.png"
-        self._lines.append(f"{_seconds(t_ns)} {name}\n")
+        self._lines.append(f"{nine_decimals(t_ns)} {name}\n")
         ordered = image[..., ::-1] if image.ndim == 3 else image  # the colours of OpenCV
         self._store_frame(name, t_ns, np.array(ordered))
 
@@ -187,18 +181,21 @@ class FolderWriter(_Davis240cWriter):
         """Write the remaining frames, the list and the description."""
         self._work.finish()
         (self._folder / LIST).write_text("".join(self._lines), "ascii", newline="\n")
+        if self._side is not None:
+            self._description["side"] = write_side(self._folder, self._side)
         text = to_json(self._description)
         (self._folder / DESCRIPTION).write_text(text, "utf-8", newline="\n")
 
 
 def _foreign(folder: Path) -> str | None:
     """Name something in `folder` that this layout, as written here, does not have."""
+    ours = (EVENTS, LIST, DESCRIPTION, *listed_side(folder, DESCRIPTION))
     for entry in sorted(folder.iterdir()):
         if entry.name == "images" and entry.is_dir():
             for image in sorted(entry.iterdir()):
                 if not image.match("frame_*.png"):
                     return f"images/{image.name}"
-        elif entry.name not in (EVENTS, LIST, DESCRIPTION):
+        elif entry.name not in ours:
             return entry.name
     return None
 
@@ -246,6 +243,8 @@ class ZipWriter(_Davis240cWriter):
         for number in range(len(self._encoded)):
             data = self._encoded.take().tobytes()
             self._add(f"images/frame_{number:08d}.png", data, zipfile.ZIP_STORED)
+        for name, data in self._side or ():
+            self._add(name, data)
         self._add(DESCRIPTION, to_json(self._description).encode())
 
     def _add(self, name: str, data: bytes, method: int = zipfile.ZIP_DEFLATED) -> None:

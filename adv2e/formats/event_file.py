@@ -65,6 +65,8 @@ class Facts:
         The reader looked for the stream that the user wants.
     needs_unit : bool
         Neither the format nor the file says the unit of its times: that of the user counts.
+    whole : (int, int)
+        Width and height of the sensor before it is cut, once events were asked for in order.
     span_us : (int, int) or None
         First and last time of the events [us], of frames where there are none; None before all
         were read.
@@ -96,6 +98,7 @@ class Facts:
         self.selection = selection
         self.has_chosen = self.needs_unit = False
         self.inputs: list[str | Path] = []
+        self.whole = 0, 0
         self.span_us: tuple[int, int] | None = None
         self.set_back = set_back
         self.crop_events = crop_events

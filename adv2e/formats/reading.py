@@ -157,7 +157,7 @@ def shots_of(file: EventFile, shots: Iterable[Shot] | None = None) -> Iterator[S
 
     `shots` are all frames, where they were listed before.
     """
-    begin_us, end_us = _wanted_us(file)
+    begin_us, end_us = wanted_us(file)
     with _reading(file.facts.path):
         if shots is None:
             shots = () if file.shots is None else file.shots()
@@ -509,6 +509,7 @@ def events_in_order(file: EventFile) -> tuple[tuple[int, int], int, Generator[Ev
         survey.tell_order()
     else:
         parts = (inside(events, size) for events in events_of_file(file))
+    file.facts.whole = size
     first_us = _span_us(file)[0] + file.facts.selection.start_ns // 1000
     return _size_wanted(file, size), first_us, _wanted(file, parts)
 
@@ -527,7 +528,7 @@ def _span_us(file: EventFile) -> tuple[int, int]:
     return file.facts.span_us
 
 
-def _wanted_us(file: EventFile) -> tuple[float, float]:
+def wanted_us(file: EventFile) -> tuple[float, float]:
     """Return the first and the last time of the part that is wanted [us]."""
     wanted = file.facts.selection
     if not wanted.is_timed:
@@ -551,7 +552,7 @@ def _size_wanted(file: EventFile, size: tuple[int, int]) -> tuple[int, int]:
 
 def _wanted(file: EventFile, parts: Iterable[Events]) -> Generator[Events, None, None]:
     """Yield what is wanted of sorted events; DataError if that leaves no events and no frames."""
-    begin_us, end_us = _wanted_us(file)
+    begin_us, end_us = wanted_us(file)
     wanted, found = file.facts.selection, False
     for events in parts:
         times = events["t"]

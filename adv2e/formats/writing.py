@@ -70,6 +70,7 @@ def open_sink(
     threads: int | None = None,
     staging: Staging | None = None,
     causes: bool = False,
+    side: SideFiles | None = None,
 ) -> Sink:
     """Return a sink for `path`, to be used in a ``with`` block.
 
@@ -100,6 +101,9 @@ def open_sink(
     causes : bool
         The events know their causes, which are stored: inside where the format has a column for
         them, else beside: see :mod:`adv2e.formats.causes`.
+    side : iterator of (name, bytes), optional
+        Files that belong to the events, asked for at the end: a DAVIS240C recording holds them,
+        beside others they are in the folder ``<path>.side``.
 
     Raises
     ------
@@ -119,6 +123,7 @@ def open_sink(
         with_frames=with_frames,
         threads=threads or default_threads(),
         causes=causes,
+        side=side,
     )
     files = Staging(overwrite) if staging is None else staging
     return Sink(chosen, request, files, is_alone=staging is None)
@@ -195,6 +200,10 @@ def write_events(
         sink.write_events(ours)
 
 
+SideFiles = Iterator[tuple[str, bytes]]
+"""Names, with the folder in which they are, and bytes of files that belong to events."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Request:
     """Output that was asked of :func:`adv2e.formats.writing.open_sink`: path, size, options."""
@@ -206,6 +215,7 @@ class Request:
     with_frames: bool
     threads: int
     causes: bool = False
+    side: SideFiles | None = None
 
 
 class Writer(ABC):
@@ -301,7 +311,10 @@ class Sink:
             self._described = staging.file(beside(request.path, ".json"))
         self._holds_causes = request.causes and format.causes != ""
         self._causes = self._place_of_causes(request, staging, temporary)
-        told = replace(request, causes=self._holds_causes)
+        self._side = self._place_of_side(request, staging, temporary)
+        side = None if self._side else request.side
+        told = replace(request, causes=self._holds_causes, side=side)
+        self._side_files = request.side or iter(())
         self._open = self._opened(partial(writer, told), staging, temporary, is_alone)
 
     def _place_of_causes(
@@ -317,6 +330,19 @@ class Sink:
             raise OutputError(
                 f"{beside}: exists, and would be taken for the causes of these events: remove it,"
                 " or write them too (--causes)"
+            )
+        return None
+
+    def _place_of_side(
+        self, request: Request, staging: Staging, temporary: list[Path]
+    ) -> Path | None:
+        """Return the folder of side data beside the output; None: they are not written there."""
+        place = beside(request.path, SIDE)
+        if request.side is not None and not self._format.is_davis240c:
+            return staging.folder(place, foreign_of(SIDE_LIST)) if temporary else None
+        if temporary and place.exists():
+            raise OutputError(
+                f"{place}: exists, and would be taken for the side data of these events: remove it"
             )
         return None
 
@@ -353,6 +379,9 @@ class Sink:
             yield made
             with writing(self._name):
                 made.finish()
+                if self._side is not None:
+                    names = write_side(self._side, self._side_files)
+                    (self._side / SIDE_LIST).write_text(to_json({"side": names}), "utf-8")
                 if self._described is not None:
                     text = to_json(self._description)
                     self._described.write_text(text, encoding="utf-8", newline="\n")
@@ -403,6 +432,39 @@ class Sink:
 
     def __exit__(self, *raised: Any) -> None:
         self._open.__exit__(*raised)
+
+
+SIDE, SIDE_LIST = ".side", "side.json"
+"""Ending of the folder beside an output that holds its side data, and what lists these."""
+
+
+def write_side(folder: Path, files: SideFiles) -> list[str]:
+    """Write side data below a folder; return what lies in it by them."""
+    names = set()
+    for name, data in files:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(data)
+        names.add(name.partition("/")[0])
+    folder.mkdir(exist_ok=True)
+    return sorted(names)
+
+
+def foreign_of(description: str) -> Callable[[Path], str | None]:
+    """Return a function that names what a folder holds beside the side data that one lists."""
+
+    def foreign(folder: Path) -> str | None:
+        held = {entry.name for entry in folder.iterdir()} - {description, *listed_side(folder)}
+        return min(held, default=None)
+
+    return foreign
+
+
+def listed_side(folder: Path, description: str = SIDE_LIST) -> list[str]:
+    """Return what of a folder its description lists as side data that we wrote."""
+    try:
+        return list(map(str, json.loads((folder / description).read_text("utf-8"))["side"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
 
 
 @contextmanager

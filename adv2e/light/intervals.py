@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from adv2e.errors import DataError
 from adv2e.light.interpolation import make_upsampler
 from adv2e.light.interpolation.linear import instant_ns, neighbours
 from adv2e.sources.times.rates import seconds
+
+if TYPE_CHECKING:
+    from adv2e.light.interpolation.flow import GivenFlow
 
 FRAME_BYTES = 16 << 20
 """Memory for the frames of one part."""
@@ -79,14 +82,24 @@ class Intervals:
         Time and light, or grey values, of the first frame.
     threads : int
         For interpolations that take their time.
+    given : callable, optional
+        Flow; see :func:`adv2e.light.interpolation.make_upsampler`.
     """
 
-    def __init__(self, t_ns: int, first: NDArray[Any], sampling: Sampling, *, threads: int) -> None:
+    def __init__(
+        self,
+        t_ns: int,
+        first: NDArray[Any],
+        sampling: Sampling,
+        *,
+        threads: int,
+        given: GivenFlow | None = None,
+    ) -> None:
         self._L = sampling.L
         self._printed = sampling.last_interval == "printed"
         # without frames in between, there is nothing to interpolate
         linear = sampling.interpolation == "linear" or sampling.L == 1
-        self._upsampler = None if linear else make_upsampler(sampling, threads=threads)
+        self._upsampler = None if linear else make_upsampler(sampling, threads=threads, given=given)
         self._first = t_ns, first
         per_frame = self._L if linear else 1
         frames = max(2, min(_MOST // per_frame + 2, FRAME_BYTES // max(1, first.nbytes)))

@@ -72,10 +72,14 @@ class Motion:
     unexplained: float = 0.0
 
 
-def estimate_motion(a: NDArray[Any], b: NDArray[Any]) -> tuple[Motion, Motion] | None:
+def estimate_motion(
+    a: NDArray[Any], b: NDArray[Any], given: NDArray[np.float32] | None = None
+) -> tuple[Motion, Motion] | None:
     """Return the motion from `a` to `b` and from `b` to `a`; None where none is to be found.
 
-    That is for frames smaller than SMALLEST, for frames equal to within 1 %, and across a cut.
+    With flow that is `given` from `a` to `b`, (rows, columns, 2), none is looked for; NaN: not
+    known.  None is for frames smaller than SMALLEST, for frames equal to within 1 %, and across a
+    cut.
     """
     if min(a.shape) < SMALLEST:
         return None
@@ -84,7 +88,7 @@ def estimate_motion(a: NDArray[Any], b: NDArray[Any]) -> tuple[Motion, Motion] |
     if not _is_seen(change):
         return None
     equal = cv2.erode((a == b).astype(np.uint8), np.ones(_AROUND, np.uint8)).astype(np.bool_)
-    there, back = _flow(ga, gb)
+    there, back = _flow(ga, gb) if given is None else _both_ways(given)
     costs = [_settle(*there, ga, gb, equal), _settle(*back, gb, ga, equal)]
     found = []
     for (u, v), (ru, rv), g, cost in ((there, back, ga, costs[0]), (back, there, gb, costs[1])):
@@ -128,6 +132,30 @@ def _flow(ga: Image, gb: Image) -> list[tuple[Image, Image]]:
         flow = search.calc(first, second, None)  # type: ignore[call-overload]
         flows.append((np.ascontiguousarray(flow[..., 0]), np.ascontiguousarray(flow[..., 1])))
     return flows
+
+
+_FAR = np.float32(1e6)
+"""Motion out of any frame, of what is not known."""
+
+
+def _both_ways(flow: NDArray[np.float32]) -> list[tuple[Image, Image]]:
+    """Return flow and its reverse: each pixel comes from where the fastest one arrives from."""
+    u, v = (np.where(np.isnan(part), _FAR, part) for part in np.moveaxis(flow, 2, 0))
+    rows, columns = np.indices(u.shape)
+    x, y = np.rint(columns + u).astype(np.int64), np.rint(rows + v).astype(np.int64)
+    inside = (x >= 0) & (x < u.shape[1]) & (y >= 0) & (y < u.shape[0])
+    order = np.argsort(np.hypot(u, v)[inside], kind="stable")
+    place = y[inside][order], x[inside][order]
+    back = np.full((2, *u.shape), np.nan, np.float32)
+    for part, moved in zip(back, (u, v), strict=True):
+        part[place] = -moved[inside][order]
+    # pixels that part leave gaps between them, which are no ground that comes into view
+    known = np.isfinite(back[0])
+    count = cv2.boxFilter(known.astype(np.float32), -1, (3, 3), normalize=False)
+    for part in back:
+        total = cv2.boxFilter(np.where(known, part, np.float32(0)), -1, (3, 3), normalize=False)
+        part[~known] = np.where(count >= 3, total / np.maximum(count, 1), _FAR)[~known]
+    return [(u, v), (back[0], back[1])]
 
 
 def _settle(u: Image, v: Image, here: Image, there: Image, equal: NDArray[np.bool_]) -> Image:

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from array import array
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -86,6 +87,12 @@ class Source(ABC):
         It may hold several tracks, and chooses among them itself.
     waits : bool
         Reading waits for others, and for ever if they please: it belongs in the main thread.
+    exposures_us : list of float
+        Exposure of each frame that `frames` yields [us]; empty where they are not known.
+    passed_ns : array of int
+        Times of all frames that `frames` looked at, wanted or not, on the source's clock [ns].
+    origin_ns : int
+        What was taken off the times of those that it yielded.
     ended_by_hand : int or None
         Number of frames after which a user ended what would have gone on; see `capturing`.
     """
@@ -109,6 +116,9 @@ class Source(ABC):
         self.packages: tuple[str, ...] = ()
         self.waits = False
         self.ended_by_hand: int | None = None
+        self.exposures_us: list[float] = []
+        self.passed_ns = array("q")
+        self.origin_ns = 0
         self.along: SensorPath | None = None
 
     def _describe(self, first: Frame, label: str, light: Light | None = None) -> None:
@@ -150,6 +160,20 @@ class Source(ABC):
         self.full_scale = light.full_scale or first.white or usual
         self.light = replace(light, full_scale=self.full_scale, full_scale_reason=why)
         self.encoding = light.encoding
+
+    def listed(self) -> Sequence[Shot]:
+        """Return all frames, in the order of time, where they are known before; else none."""
+        return ()
+
+    def own_times_ns(self) -> list[int] | None:
+        """Return the times of the frames that a rate replaces [ns]; None: there are none.
+
+        Raises
+        ------
+        DataError
+            Their list cannot be read.
+        """
+        return None
 
     def capturing(self, told: str) -> AbstractContextManager[None]:
         """Return a context within which a user can end frames that would come for ever.
@@ -196,8 +220,10 @@ class Source(ABC):
         previous: Shot | None = None
         origin: int | None = None
         yielded = 0
+        self.passed_ns = array("q")
         for shot in self.shots():
             check_time(shot.t_ns, shot.label)
+            self.passed_ns.append(shot.t_ns)
             first = first or shot
             if previous is not None and shot.t_ns <= previous.t_ns:
                 raise DataError(
@@ -211,7 +237,7 @@ class Source(ABC):
             if since_first < self.selection.start_ns:
                 continue
             if origin is None:
-                origin = self._origin(first, shot)
+                origin = self.origin_ns = self._origin(first, shot)
             yielded += 1
             yield self._frame(shot, shot.t_ns - origin)
         if yielded < 2:

@@ -7,6 +7,7 @@ measured, without a curve.  Neither white balance nor a matrix of the camera is 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import cv2
@@ -28,7 +29,7 @@ def light_of(pattern: str) -> Light:
 
 def in_colour(shot: Shot, pattern: str) -> Shot:
     """Return a shot of a mosaic as one in colour."""
-    return Shot(shot.t_ns, shot.label, partial(_load, shot.load, pattern, shot.label))
+    return replace(shot, load=partial(_load, shot.load, pattern, shot.label))
 
 
 def _load(load: Callable[[], Frame], pattern: str, label: str) -> Frame:

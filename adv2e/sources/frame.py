@@ -111,11 +111,15 @@ class Light:
 
 @dataclass(frozen=True)
 class Shot:
-    """A frame not loaded yet: time on the source's clock [ns], name for messages, loader."""
+    """A frame not loaded yet: time on the source's clock [ns], name for messages, loader.
+
+    Its exposure [ns] is 0 where it is not known.
+    """
 
     t_ns: int
     label: str
     load: Callable[[], Frame]
+    exposure_ns: int = 0
 
 
 def rotated180(frame: Frame) -> Frame:

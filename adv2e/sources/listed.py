@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from adv2e.errors import DataError
@@ -27,13 +28,15 @@ class Picture:
 class Timed:
     """Frames with their times, what is doubtful and what else is to be told of these.
 
-    `found` is the list that lies beside them, whether its times are taken or others.
+    `found` is the list that lies beside them, whether its times are taken or others; `own` returns
+    its times [ns] where a rate replaces them.
     """
 
     shots: list[Shot]
     doubts: list[str]
     notes: list[str]
     found: str | None = None
+    own: Callable[[], list[int]] | None = None
 
 
 def timed(
@@ -85,7 +88,26 @@ def timed(
         )
     if found is not None and not _is_same(given.timestamps, found):
         result.notes.append(f"{given} replaces the times in {found}")
-    return replace(result, found=found)
+    if given.rate is None or found is None or read_found is None:
+        return replace(result, found=found)
+    own = partial(_own_times, found, read_found, pictures, path, result.shots)
+    return replace(result, found=found, own=own)
+
+
+def _own_times(
+    found: str,
+    read_found: Callable[[str], FrameList],
+    pictures: Sequence[Picture],
+    path: Path,
+    shots: Sequence[Shot],
+) -> list[int]:
+    """Return the times [ns] that a list has for frames to which a rate was given."""
+    listed = _listed(read_found(found), found, pictures, path, ())
+    times = {shot.label: shot.t_ns for shot in listed.shots}
+    missing = next((shot.label for shot in shots if shot.label not in times), None)
+    if missing is not None:
+        raise DataError(f"{found}: has no time for {missing}")
+    return [times[shot.label] for shot in shots]
 
 
 def _is_same(file: Path | None, other: str) -> bool:
@@ -106,7 +128,7 @@ def _listed(
     else:
         raise _other_number(label, len(stamps), len(pictures), path)
     shots = [
-        Shot(stamp.t_ns, pictures[at].label, pictures[at].load)
+        Shot(stamp.t_ns, pictures[at].label, pictures[at].load, stamp.exposure_ns)
         for stamp, at in zip(stamps, places, strict=True)
     ]
     return Timed(shots, doubts, notes)
@@ -144,6 +166,7 @@ class ListedSource(Source):
         if (pattern := selection.bayer) is not None:
             shots = self._shots = [in_colour(shot, pattern) for shot in shots]
             light = light_of(pattern)
+        self._own = timed.own
         self.doubts += timed.doubts
         self.notes += timed.notes
         if selection.allow_damaged:
@@ -180,10 +203,24 @@ class ListedSource(Source):
             )
         first_ns = self._shots[0].t_ns
         chosen = self.selection
-        inside = (chosen.start_ns <= s.t_ns - first_ns <= chosen.stop_ns for s in self._shots)
-        self.count = sum(inside)
+        inside = [
+            shot
+            for shot in self._shots
+            if chosen.start_ns <= shot.t_ns - first_ns <= chosen.stop_ns
+        ]
+        self.count = len(inside)
+        if any(shot.exposure_ns for shot in inside):
+            self.exposures_us = [shot.exposure_ns / 1000 for shot in inside]
         if self.count < 2:
             raise self._too_few(self.count, self._shots[-1].t_ns - first_ns)
+
+    def listed(self) -> Sequence[Shot]:
+        """Return all frames, in the order of time."""
+        return self._shots
+
+    def own_times_ns(self) -> list[int] | None:
+        """Return the times of the frames that a rate replaces [ns]; None: there are none."""
+        return None if self._own is None else self._own()
 
     def shots(self) -> Iterator[Shot]:
         """Yield every frame, not loaded."""

@@ -114,6 +114,8 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "with_frames": True,
         "overwrite": True,
         "preview": "p.gif",
+        "side": None,
+        "blurred_frames": None,
         "causes": True,
         "progress": True,
         "also_read": [find("ideal")],

@@ -171,7 +171,8 @@ def test_motion_is_found_once_for_each_pair(monkeypatch):
 
     asked = []
 
-    def estimate(a, b):
+    def estimate(a, b, given):
+        assert given is None
         asked.append((a[0, 0], b[0, 0]))
 
     monkeypatch.setattr(flow, "estimate_motion", estimate)

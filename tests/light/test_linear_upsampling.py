@@ -82,7 +82,7 @@ def test_pairs_that_do_not_fit_are_refused(interpolation):
 
 def test_unknown_interpolation_names_key_and_choices():
     with pytest.raises(
-        ConfigError, match="interpolation: must be one of linear, flow, onnx, got 'cubic'"
+        ConfigError, match="interpolation: must be one of linear, flow, given, onnx, got 'cubic'"
     ):
         Sampling(interpolation="cubic")
 

@@ -2,7 +2,7 @@
 
     DN_frame(t) = 1/T * integral of DN(s) ds from t - T/2 to t + T/2
 
-T           frames.exposure_us
+T           frames.exposure_us, or the exposure of each frame where a list says it
 t           time of the frame, the middle of its exposure
 
 The pixel sees the light itself, so what the exposure took away is put back.  This module seeks the
@@ -40,6 +40,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -69,7 +70,7 @@ _STRIP = 1024
 """Pixels that are solved at a time."""
 
 
-def means(times: Array, exposure: float) -> Array:
+def means(times: Array, exposure: float | Array) -> Array:
     """Return the matrix that takes light at `times` to its means over exposures about them.
 
     Its rows have sum 1 and, as near as it comes, the variance of the exposure: a mixture of the
@@ -104,11 +105,12 @@ def _under_hats(at: Array, times: Array) -> Array:
 
 
 def sharpened(
-    frames: list[NDArray[Any]], times: Array, exposure: float, begin: int, end: int
+    frames: list[NDArray[Any]], times: Array, exposure: float | Array, begin: int, end: int
 ) -> list[NDArray[Any]]:
     """Return the light at the times begin..end of `frames` that average it over an exposure.
 
-    `frames` and `times` are those of a block with its margins; the exposure is in their unit.
+    `frames` and `times` are those of a block with its margins; the exposure, of all or of each, is
+    in their unit.
     """
     matrix = means(times, exposure)
     used = matrix > 0.0
@@ -133,13 +135,15 @@ def sharpened(
 
 
 class ExposureBlurHooks(Hooks):
-    """Puts back what an exposure of `exposure_us` took away."""
+    """Puts back what an exposure of `exposure_us` took away, or `each_us` of each frame."""
 
     stage = "frames"
 
-    def __init__(self, exposure_us: float) -> None:
+    def __init__(self, exposure_us: float, each_us: Sequence[float] = ()) -> None:
         super().__init__()
-        self._exposure = exposure_us * 1e3
+        self._exposure = max([exposure_us, *each_us]) * 1e3
+        self._each = np.multiply(each_us, 1e3)
+        self._dropped = 0
 
     def light(self, frames: Frames) -> Frames:
         """Yield the light at the times of the frames, a block at a time."""
@@ -152,6 +156,7 @@ class ExposureBlurHooks(Hooks):
                 yield from self._block(held, done, end)
                 keep = self._first_of_margin(held, end)
                 del held[:keep]
+                self._dropped += keep
                 done = end - keep
         yield from self._block(held, done, len(held))
 
@@ -182,6 +187,7 @@ class ExposureBlurHooks(Hooks):
         if len(frames) == 1:
             yield held[0]
             return
-        made = sharpened(frames, times, self._exposure, begin, end)
+        each = self._each[self._dropped : self._dropped + len(held)]
+        made = sharpened(frames, times, each if each.size else self._exposure, begin, end)
         for (t_ns, _), light in zip(held[begin:end], made, strict=True):
             yield t_ns, light

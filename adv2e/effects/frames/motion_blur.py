@@ -2,7 +2,7 @@
 
     DN_frame(x) = 1/T * integral of DN(x - v s) ds from -T/2 to T/2
 
-T           frames.exposure_us
+T           frames.exposure_us, or the exposure of each frame where a list says it
 v           velocity at the time of the frame, the middle of its exposure
 
 This takes the place of the module exposure_blur where frames are interpolated along the motion.
@@ -35,7 +35,7 @@ References
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import cv2
@@ -121,20 +121,22 @@ def sharpened(light: NDArray[Any], u: Image, v: Image) -> NDArray[Any]:
 
 
 class MotionBlurHooks(Hooks):
-    """Puts back what an exposure of `exposure_us` smeared."""
+    """Puts back what an exposure of `exposure_us` smeared, or `each_us` of each frame."""
 
     name = "exposure_blur"
     stage = "frames"
 
-    def __init__(self, exposure_us: float) -> None:
+    def __init__(self, exposure_us: float, each_us: Sequence[float] = ()) -> None:
         super().__init__()
-        self._exposure = exposure_us * 1e3
+        self._exposure, self._each = exposure_us, each_us
 
     def light(self, frames: Frames) -> Frames:
         """Yield the light at the times of the frames, one behind."""
         before: Motion | None = None
         span_before = 1.0
-        for (t_ns, light), following in _pairs(frames):
+        each = self._each or itertools.repeat(self._exposure)
+        pairs = zip(_pairs(frames), each, strict=bool(self._each))
+        for ((t_ns, light), following), exposure_us in pairs:
             after, span_after = None, 1.0
             back: Motion | None = None
             if following is not None:
@@ -146,7 +148,7 @@ class MotionBlurHooks(Hooks):
             if found is None:
                 yield t_ns, light
             else:
-                u, v = (part * np.float32(self._exposure) for part in found)
+                u, v = (part * np.float32(exposure_us * 1e3) for part in found)
                 yield t_ns, sharpened(np.ascontiguousarray(light), u, v)
             before, span_before = back, span_after
 

@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 from numpy.typing import NDArray
 
 from adv2e.config.model import Sampling
+from adv2e.errors import ConfigError
 from adv2e.light.interpolation.linear import NOTHING, Beside, LinearUpsampler
 
 if TYPE_CHECKING:
+    from adv2e.light.interpolation.flow import GivenFlow
     from adv2e.light.interpolation.onnx_file import Network
 
 
@@ -47,15 +49,19 @@ class Upsampler(Protocol):
         ...
 
 
-def make_upsampler(sampling: Sampling, *, threads: int = 1) -> Upsampler:
+def make_upsampler(
+    sampling: Sampling, *, threads: int = 1, given: GivenFlow | None = None
+) -> Upsampler:
     """Return the upsampler for an interpolation: linear, along the motion, or by a network.
 
-    `threads` in-between frames are made at a time; they do not depend on it.
+    `threads` in-between frames are made at a time; they do not depend on it.  `given` is the flow
+    of interpolation: given, see :class:`.flow.Paths`.
 
     Raises
     ------
     ConfigError
-        A network's file is not one that can be asked, or cannot make so many frames.
+        A network's file is not one that can be asked, or cannot make so many frames; flow is to be
+        given, and is not.
     MissingExtraError
         A network is asked for, and what runs it is not installed.
     """
@@ -64,7 +70,11 @@ def make_upsampler(sampling: Sampling, *, threads: int = 1) -> Upsampler:
     # imported late: compiled code
     from adv2e.light.interpolation.flow import Paths  # noqa: PLC0415
 
-    paths = Paths(sampling.L, sampling.max_motion_px)
+    if (given is None) == (sampling.interpolation == "given"):
+        raise ConfigError(
+            "sampling.interpolation: given is for 'adv2e convert' of frames with flow beside them"
+        )
+    paths = Paths(sampling.L, sampling.max_motion_px, given)
     network = network_of(sampling)
     if network is None:
         from adv2e.light.interpolation.flow import FlowUpsampler  # noqa: PLC0415

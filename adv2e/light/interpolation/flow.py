@@ -30,7 +30,7 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,6 +59,8 @@ Pair = tuple[Motion, Motion]
 Bent = tuple[Bend, Bend] | None
 
 _UNEXPLAINED_MOST = 0.5
+
+GivenFlow = Callable[[int], NDArray[np.float32]]
 
 
 @dataclass(frozen=True)
@@ -89,10 +91,16 @@ class Paths:
         Most frames an interval gets.
     max_motion_px : float, optional
         Furthest that a pixel may move from one frame to the next [px]; None: always `L` frames.
+    given : callable, optional
+        Returns the flow from a frame to the next by the number of the first, (rows, columns, 2);
+        default: it is looked for.
     """
 
-    def __init__(self, L: int, max_motion_px: float | None = None) -> None:
-        self.L, self._max_motion_px = L, max_motion_px
+    def __init__(
+        self, L: int, max_motion_px: float | None = None, given: GivenFlow | None = None
+    ) -> None:
+        self.L, self._max_motion_px, self._given = L, max_motion_px, given
+        self._asked = 0
         self._motions: list[tuple[Array, Array, Pair | None]] = []
         self._last: tuple[Array, Array, Way] | None = None
 
@@ -134,7 +142,10 @@ class Paths:
         for first, second, found in self._motions:
             if first is a and second is b:
                 return found
-        found = estimate_motion(a, b)
+        # pairs of neighbours are asked for in their order, each once
+        flow = None if self._given is None else self._given(self._asked)
+        self._asked += 1
+        found = estimate_motion(a, b, flow)
         self._motions = [*self._motions[-2:], (a, b, found)]
         return found
 

@@ -112,6 +112,7 @@ class PipeSource(Source):
         if self._given.timestamps is not None:
             label = str(self._given.timestamps)
             found = read_list(self._given.timestamps, time_unit=self._given.time_unit)
+            found.check_instants(label)
             doubts, notes = found.told(label)
             self._stamps, self._rate = found.stamps, None
             self.doubts += doubts

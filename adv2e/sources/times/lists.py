@@ -95,6 +95,7 @@ def match(stamps: Sequence[Stamp], paths: Sequence[str], label: str, where: str)
 #
 # - a heading (``timestamp,filename``; ``# id timestamp image_name``; ``#timestamp [ns],filename``)
 #   says it;
+# - of a heading with start and end, as of exposures, the middle is the time;
 # - else the only column that is no number is the name, and the only column of numbers the time.
 #
 # What that leaves open is an error that shows the line. Names that hold separators are quoted;
@@ -106,6 +107,8 @@ _TIME = re.compile(
     r"(time|times|timestamp|timestamps|time ?stamp|stamp|ts|t|timecode|sec|secs|seconds)"
     r"([\s_(\[-].*)?|s|ms|us|ns|[mun]secs?|(?:milli|micro|nano)seconds"
 )
+_START = re.compile(r"(exposure[\s_-]?)?(start|begin)([\s_(\[-].*)?")
+_END = re.compile(r"(exposure[\s_-]?)?(end|stop)([\s_(\[-].*)?")
 _NAME = re.compile(
     r"(image|img|frame|rgb|color|colour)?[\s_-]?(file|name|filename|image|img|path|filepath)"
     r"([\s_-]?(name|path|file))?"
@@ -143,17 +146,22 @@ class Table:
         Columns of the times and, if there is one, of the names.
     unit : str or None
         The unit of the times that the heading states.
+    end : int, optional
+        Column of the ends of exposures, which begin at the times.
     """
 
     lines: list[Line]
     time: int
     name: int | None
     unit: str | None
+    end: int | None = None
 
     def described(self, unit: str) -> str:
         """Return the roles of the columns in words, their times being in `unit`."""
         words = ["unused"] * len(self.lines[0].fields)
-        words[self.time] = f"time [{unit}]"
+        words[self.time] = f"time [{unit}]" if self.end is None else f"start of exposure [{unit}]"
+        if self.end is not None:
+            words[self.end] = "its end"
         if self.name is not None:
             words[self.name] = "name"
         return ", ".join(words)
@@ -183,22 +191,26 @@ def table_of(text: str, label: str) -> Table:
     headings = next(filter(None, (_heading(c, len(columns)) for c in reversed(comments))), None)
     roles = [_role(word) for word in headings or [""] * len(columns)]
     times = [at for at, role in enumerate(roles) if role == "time"]
+    end = None
+    if not times and {"start", "end"} <= {*roles}:
+        times, end = [roles.index("start")], roles.index("end")
     if not times:
         times = [at for at in numbers if not roles[at]]
     if len(times) != 1:
         raise _open(lines[0], times, "time", label)
     (time,) = times
     for line in lines:
-        if not _is_number(line.fields[time]):
-            raise DataError(
-                f"{label} line {line.number}: {line.fields[time][:40]!r} is not a number; a time is"
-                " expected there"
-            )
+        for at in (time,) if end is None else (time, end):
+            if not _is_number(line.fields[at]):
+                raise DataError(
+                    f"{label} line {line.number}: {line.fields[at][:40]!r} is not a number; a time"
+                    " is expected there"
+                )
     named = [at for at in others if roles[at] == "name"] or others
     if len(named) > 1:
         raise _open(lines[0], named, "name of the image", label)
     unit = _unit_of_heading(headings[time]) if headings else None
-    return Table(lines, time, named[0] if named else None, unit)
+    return Table(lines, time, named[0] if named else None, unit, end)
 
 
 def has_lines(text: str) -> bool:
@@ -294,13 +306,15 @@ def _heading(text: str, width: int) -> list[str] | None:
 
 
 def _has_time(words: list[str]) -> bool:
-    return "time" in map(_role, words)
+    roles = {*map(_role, words)}
+    return "time" in roles or {"start", "end"} <= roles
 
 
 def _role(word: str) -> str:
-    """Return the role of a column by its heading: 'time', 'name', 'count', 'other' or ''."""
+    """Return the role of a column: 'time', 'start', 'end', 'name', 'count', 'other' or ''."""
     word = word.strip("\"'# ").lower()
-    for role, form in (("time", _TIME), ("name", _NAME), ("count", _COUNT)):
+    forms = {"time": _TIME, "start": _START, "end": _END, "name": _NAME, "count": _COUNT}
+    for role, form in forms.items():
         if form.fullmatch(word):
             return role
     return "other" if word else ""
@@ -343,6 +357,14 @@ class FrameList:
     unit: Unit
     order: str = ""
     whole: bool = False
+
+    def check_instants(self, label: str) -> None:
+        """Raise DataError if it has exposures, for sources that do not take these."""
+        if any(stamp.exposure_ns for stamp in self.stamps):
+            raise DataError(
+                f"{label}: exposures, with start and end, are for pictures and stacks: make a"
+                " folder of pictures of these frames, or a list of their middles"
+            )
 
     def told(self, label: str) -> tuple[list[str], list[str]]:
         """Return doubts about the list `label`, and notes on it."""
@@ -436,13 +458,17 @@ def parse_list(
 
 
 def _stamp(line: Line, table: Table, unit: Unit, label: str) -> Stamp:
+    ends = (table.time,) if table.end is None else (table.time, table.end)
     try:
-        t_ns = parse_ns(line.fields[table.time], unit.ns)
+        first, *last = (parse_ns(line.fields[at], unit.ns) for at in ends)
     except ValueError as error:
         raise DataError(
             f"{label} line {line.number}: {error}; a time in {unit.name} is expected there"
         ) from error
-    return Stamp(t_ns, line.number, _name(line, table))
+    exposure = last[0] - first if last else 0
+    if exposure < 0:
+        raise DataError(f"{label} line {line.number}: the exposure ends before it starts")
+    return Stamp(first + exposure // 2, line.number, _name(line, table), exposure)
 
 
 def _name(line: Line, table: Table) -> str | None:

@@ -31,11 +31,12 @@ NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 
 @dataclass(frozen=True)
 class Stamp:
-    """One line of a list of times."""
+    """One line of a list of times; with an exposure, its middle is the time."""
 
     t_ns: int
     line: int
     name: str | None
+    exposure_ns: int = 0
 
 
 def parse_ns(text: str, unit_ns: int = NS_PER_S) -> int:
@@ -59,6 +60,12 @@ def seconds(t_ns: int) -> str:
     sign = "-" if t_ns < 0 else ""
     whole, part = divmod(abs(t_ns), NS_PER_S)
     return sign + (f"{whole}.{part:09d}".rstrip("0").rstrip("."))
+
+
+def nine_decimals(t_ns: int) -> str:
+    """Return a time [ns] in seconds with nine decimals, exactly."""
+    whole, rest = divmod(abs(int(t_ns)), NS_PER_S)
+    return f"{'-' if t_ns < 0 else ''}{whole}.{rest:09d}"
 
 
 Rate = float | Fraction | str

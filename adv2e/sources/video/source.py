@@ -107,6 +107,7 @@ class VideoSource(Source):
     def _list(self, timestamps: Path, time_unit: str | None) -> list[Stamp]:
         own_s = self._listing.usual_ns / NS_PER_S if self._listing.shown_ns else 0
         found = read_list(timestamps, time_unit=time_unit, own_step_s=own_s)
+        found.check_instants(str(timestamps))
         doubts, notes = found.told(str(timestamps))
         self.doubts += doubts
         self.notes += notes
