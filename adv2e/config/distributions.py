@@ -19,13 +19,13 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
-import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass
+from itertools import accumulate
 from typing import Any, TypeAlias
 
-from adv2e.config.build import Key, keys_of, parts_of
+from adv2e.config.build import Key, all_keys, parts_of
 from adv2e.config.tree import LAWS, TIE, form_text
 from adv2e.config.yaml12 import Value
 from adv2e.errors import Adv2eError, did_you_mean
@@ -113,15 +113,16 @@ class Distributions:
     """
 
     def __init__(self, section: type[Section], tree: Value) -> None:
-        self._section, self._tree = section, tree
-        self._keys: dict[str, Key] = {}
+        self._known = {key.path: key for key in all_keys(section)}
+        self._numbers = {key.path: key for key in _numbers(self._known.values())}
+        self._written = dict(_values(tree))
         self._drawn: dict[str, _Law | _Tie] = {}
         self.forms: dict[str, Value] = {}
         """As they were written, by the path of the key."""
-        for key, value in _numbers(section, tree):
-            if isinstance(value.content, dict):
-                self._keys[key.path], self.forms[key.path] = key, value
-                self._drawn[key.path] = _parsed(key, value)
+        for path, key in self._numbers.items():
+            value = self._written.get(path)
+            if value is not None and isinstance(value.content, dict):
+                self.forms[path], self._drawn[path] = value, _parsed(key, value)
         for path, one in self._drawn.items():
             if isinstance(one, _Tie) and one.key not in self._drawn:
                 self._fixed(one.key, path)
@@ -143,7 +144,7 @@ class Distributions:
     def _draw(self, path: str, seed: int, numbers: dict[str, Number]) -> Number:
         if path in numbers:
             return numbers[path]
-        drawn, about = self._drawn[path], self._keys[path].about
+        drawn, about = self._drawn[path], self._numbers[path].about
         other: Number = 0
         if isinstance(drawn, _Tie):
             known = drawn.key in self._drawn
@@ -164,7 +165,7 @@ class Distributions:
         raise self._complaint(path, f"{_TRIES:,} draws were all outside of its range: {wrong}")
 
     def _not_whole(self, path: str, number: Number) -> str | None:
-        if self._keys[path].kind is int and not isinstance(number, int):
+        if self._numbers[path].kind is int and not isinstance(number, int):
             return f"must be a whole number, got {number:g}"
         return None
 
@@ -181,28 +182,24 @@ class Distributions:
 
     def _fixed(self, wanted: str, path: str) -> Number:
         """Return the number at the key `wanted`, which is not drawn; `path` is tied to it."""
-        section, tree = self._section, self._tree
-        known = {key.path: key for key in _all_numbers(section)}
-        if wanted not in known:
-            hint = filter(None, [f"{wanted} is no key of a number", did_you_mean(wanted, [*known])])
+        if wanted not in self._numbers:
+            near = did_you_mean(wanted, [*self._numbers])
+            hint = filter(None, [f"{wanted} is no key of a number", near])
             raise self._complaint(path, ", ".join(hint))
-        names, index = re.fullmatch(r"([^\[]+)(?:\[(\d+)\])?", wanted).groups()  # type: ignore[union-attr]
-        here: Value | None = tree
-        default: Any = MISSING
-        for name in names.split("."):
-            content = here.content if here is not None else None
-            key = next(key for key in keys_of(section) if key.name == name)
-            here = content.get(name) if isinstance(content, dict) else None
-            default = here.content if here is not None else key.default
-            if default is None or default is MISSING:
+        names, _, index = wanted.partition("[")
+        found: Any = None
+        for name in accumulate(names.split("."), "{}.{}".format):
+            written, key = self._written.get(name), self._known[name]
+            found = key.default if written is None else written.content
+            if found is None or found is MISSING:
                 raise self._complaint(path, f"{wanted} has no number: it is off or not given")
-            section = key.kind
-        if index is not None:
-            part = default[int(index)] if len(default) > int(index) else None
-            default = part.content if isinstance(part, Value) else part
-        if isinstance(default, bool) or not isinstance(default, (int, float)):
+        if index:
+            number = int(index.removesuffix("]"))
+            part = found[number] if len(found) > number else None
+            found = part.content if isinstance(part, Value) else part
+        if isinstance(found, bool) or not isinstance(found, (int, float)):
             raise self._complaint(path, f"{wanted} has no number")
-        return default
+        return found
 
 
 def _share(seed: int, path: str, attempt: int) -> float:
@@ -214,27 +211,22 @@ def _value(number: _Law | Number, seed: int, path: str, attempt: int) -> Number:
     return number.at(_share(seed, path, attempt)) if isinstance(number, _Law) else number
 
 
-def _numbers(section: type[Section], tree: Value, path: str = "") -> Iterator[tuple[Key, Value]]:
-    if not isinstance(tree.content, dict):
+def _values(tree: Value, path: str = "") -> Iterator[tuple[str, Value]]:
+    """Yield all values that were written, sections and parts of lists among them, by their path."""
+    if isinstance(tree.content, dict):
+        below = {f"{path}.{key}" if path else key: item for key, item in tree.content.items()}
+    elif isinstance(tree.content, list):
+        below = {f"{path}[{number}]": item for number, item in enumerate(tree.content)}
+    else:
         return
-    for key in keys_of(section, path):
-        value = tree.content.get(key.name)
-        if value is None:
-            continue
-        if key.is_section:
-            yield from _numbers(key.kind, value, key.path)
-        elif key.parts:
-            if isinstance(value.content, list):
-                yield from zip(parts_of(key), value.content, strict=False)
-        elif key.kind in (int, float):
-            yield key, value
+    for name, value in below.items():
+        yield name, value
+        yield from _values(value, name)
 
 
-def _all_numbers(section: type[Section], path: str = "") -> Iterator[Key]:
-    for key in keys_of(section, path):
-        if key.is_section:
-            yield from _all_numbers(key.kind, key.path)
-        elif key.parts:
+def _numbers(keys: Iterable[Key]) -> Iterator[Key]:
+    for key in keys:
+        if key.parts:
             yield from parts_of(key)
         elif key.kind in (int, float):
             yield key
