@@ -98,11 +98,6 @@ def _microseconds(text: str) -> int:
     return length
 
 
-TIME = Parsed("time", _microseconds)
-SIZE = Parsed("size", parse_size)
-RECTANGLE = Parsed("rectangle", parse_rectangle)
-
-
 def rate(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     """Return a rate as it was written; raise BadParameter if it is none."""
     from adv2e.sources.times.rates import parse_rate
@@ -236,16 +231,15 @@ def config_options(body: Body) -> Body:
     return with_config  # type: ignore[return-value]
 
 
-SECONDS = FiniteNumber(min=0)
 POSITIVE = FiniteNumber(min=0, min_open=True)
 
 _TYPES: dict[str, Any] = {
     "path": click.Path(path_type=Path),
-    "size": SIZE,
-    "rectangle": RECTANGLE,
-    "seconds": SECONDS,
+    "size": Parsed("size", parse_size),
+    "rectangle": Parsed("rectangle", parse_rectangle),
+    "seconds": FiniteNumber(min=0),
     "share": FiniteNumber(0, MOST_SHARE),
-    "time": TIME,
+    "time": Parsed("time", _microseconds),
 }
 """Types of Click by kind of option; the others are text."""
 

@@ -54,7 +54,7 @@ from adv2e.events import EVENT_DTYPE, Events
 from adv2e.files.backlog import Backlog
 from adv2e.files.regular import expand
 from adv2e.formats.clock import shots_in_order
-from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry
+from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry, joined
 from adv2e.formats.writing import Pieces, Request, Writer
 from adv2e.light.pictures import eight_bit
 from adv2e.sources.frame import Frame, Shot, Track, counted
@@ -192,7 +192,6 @@ def _zstd(label: str) -> Any:
 
 _MOST_HEADER = 1 << 24  # bytes
 _EVENTS, _FRAME = "EVTS", "FRME"
-_GATHERED = 1 << 20  # events yielded at once, or some more
 
 _TYPES = {0: np.uint8, 2: np.uint16}
 """Depths of a frame, as OpenCV numbers them."""
@@ -248,25 +247,16 @@ def open_aedat4(path: Path, facts: Facts) -> EventFile:
         if events is None:
             return
         with path.open("rb") as file:
-            held: list[np.ndarray[tuple[int], np.dtype[np.void]]] = []
             for begin, label, data in _packets(path, file, head, events.number, facts):
                 table = Table(unpacked(data, head.compression, label), _EVENTS.encode(), label)
-                held.append(table.array(0, EVENT))
-                check_us(held[-1]["t"], label)
-                if sum(map(len, held)) >= _GATHERED:
-                    yield _columns(held)
-                    held = []
-                    facts.progress(begin, head.end)
-            if held:
-                yield _columns(held)
+                part = table.array(0, EVENT)
+                check_us(part["t"], label)
+                yield part["t"], part["x"], part["y"], (part["p"] != 0).astype(np.uint8)
+                facts.progress(begin, head.end)
             facts.progress(head.end, head.end)
 
-    return EventFile("aedat4", facts, parts, (lambda: iter(shots)) if shots else None)
-
-
-def _columns(held: list[np.ndarray[tuple[int], np.dtype[np.void]]]) -> Columns:
-    t, x, y, p = (np.concatenate([part[name] for part in held]) for name in ("t", "x", "y", "p"))
-    return t, x, y, (p != 0).astype(np.uint8)
+    gathered = partial(joined, parts)
+    return EventFile("aedat4", facts, gathered, (lambda: iter(shots)) if shots else None)
 
 
 def _chosen(path: Path, head: _Head, facts: Facts) -> tuple[_Stream | None, _Stream | None]:

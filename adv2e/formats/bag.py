@@ -65,7 +65,7 @@ from adv2e.files.regular import check_expansion, expand
 from adv2e.files.staging import Staging
 from adv2e.formats.binary import DECODERS
 from adv2e.formats.clock import shots_in_order
-from adv2e.formats.event_file import MOST_COLUMNS, Columns, EventFile, Facts
+from adv2e.formats.event_file import MOST_COLUMNS, Columns, EventFile, Facts, joined
 from adv2e.formats.writing import Pieces, Request, Writer, to_json
 from adv2e.light.pictures import eight_bit
 from adv2e.process.machine import machine_complaint
@@ -336,7 +336,6 @@ def _header(t_ns: int, is_cdr: bool) -> bytes:
 _PACKETS = "event_camera_msgs/msg/EventPacket", "event_array_msgs/msg/EventArray"
 _EVENTS = EVENT_ARRAY, "prophesee_event_msgs/msg/EventArray", *_PACKETS
 _IMAGES = {IMAGE: read_image, COMPRESSED: read_compressed}
-_GATHERED = 1 << 20  # events yielded at once, or some more
 
 
 def open_bag(path: Path, facts: Facts) -> EventFile:
@@ -363,29 +362,18 @@ def open_bag(path: Path, facts: Facts) -> EventFile:
         facts.state((width, height), "its first image")
 
     def parts() -> Iterator[Columns]:
-        held: list[Columns] = []
         total = bag.events_count
         for number, message in enumerate(bag.events(), 1):
-            held.append(message.columns)
-            if sum(columns[0].size for columns in held) >= _GATHERED:
-                yield _joined(held)
-                held = []
-                facts.progress(number, max(number, total))
-        if held:
-            yield _joined(held)
+            yield message.columns
+            facts.progress(number, max(number, total))
         facts.progress(max(total, 1), max(total, 1))
 
     shots = partial(_shots, bag, facts) if bag.images is not None and bag.images.count else None
-    return EventFile("bag" if bag.is_ros1 else "ros2", facts, parts, shots)
+    return EventFile("bag" if bag.is_ros1 else "ros2", facts, partial(joined, parts), shots)
 
 
 def _size(size: tuple[int, int]) -> tuple[int, int] | None:
     return size if min(size) > 0 and max(size) <= MOST_COLUMNS else None
-
-
-def _joined(held: list[Columns]) -> Columns:
-    t, x, y, p = (np.concatenate(columns) for columns in zip(*held, strict=True))
-    return t, x, y, p
 
 
 def _shots(bag: _Bag, facts: Facts) -> Iterator[Shot]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.formats.clock import unwrapped
@@ -33,6 +34,9 @@ Columns = tuple[Column, Column, Column, Column]
 
 Progress = Callable[[int, int], None]
 """Is told how much of a file was read, and of how much: bytes, or events."""
+
+_GATHERED = 1 << 20
+"""Events of packets that go on together, or some more."""
 
 _WHOLE = Selection()
 
@@ -271,6 +275,25 @@ class EventFile:
         """Files that are read, and their folder, where nothing may be written."""
         shots = self.shots() if self.shots is not None and self.facts.path.is_dir() else ()
         return [self.facts.path, *self.facts.inputs, *(shot.label for shot in shots)]
+
+
+def joined(parts: Callable[[], Iterator[Columns]]) -> Iterator[Columns]:
+    """Yield the events of small packets, many of them at once."""
+    held: list[Columns] = []
+    count = 0
+    for columns in parts():
+        held.append(columns)
+        count += columns[0].size
+        if count >= _GATHERED:
+            yield _concatenated(held)
+            held, count = [], 0
+    if held:
+        yield _concatenated(held)
+
+
+def _concatenated(held: list[Columns]) -> Columns:
+    t, x, y, p = (np.concatenate(columns) for columns in zip(*held, strict=True))
+    return t, x, y, p
 
 
 def described_geometry(description: Mapping[str, Any]) -> tuple[int, int] | None:
