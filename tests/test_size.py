@@ -37,7 +37,7 @@ LIMITS = {
     "pixel": 575,
     "process": 265,
     "rendering": 740,
-    "reports": 1800,
+    "reports": 1791,
     "representations": 112,
     "side": 805,
     "sources": 3680,

@@ -26,11 +26,10 @@ from adv2e.batches.plan import (
 )
 from adv2e.batches.sequences import Sequence as Found
 from adv2e.batches.sequences import find_sequences
-from adv2e.batches.work import Engine, Export, Job, config_of, write_lists
+from adv2e.batches.work import Engine, Export, Job, write_lists
 from adv2e.config import Family, Written, load_family, to_dict
 from adv2e.config.active_effects import user_sources
 from adv2e.config.user_effects import load_effects
-from adv2e.conversion.estimate import Estimate, estimate
 from adv2e.errors import Adv2eError, OutputError, UsageError
 from adv2e.files.regular import shown
 from adv2e.files.states import digest_of_values, state_of
@@ -208,17 +207,6 @@ class Batch:
             )
         return tasks
 
-    def forecast(
-        self, tasks: Sequence[Task], jobs: int | None, threads: int | None
-    ) -> Estimate | None:
-        waiting = [task for task in tasks if task.why and not task.only_export]
-        count, each = _shares(len(waiting), jobs, threads)
-
-        def job_of(task: Task) -> Job:
-            return _job(task, self._settings, self._wanted, each)
-
-        return forecast(waiting, job_of, count)
-
     def run(
         self,
         *,
@@ -336,7 +324,7 @@ def batch(
     """
     work = open_batch(source, dest, config, sets=sets, seed=seed, effects=effects, **options)
     with ExitStack() as stack:
-        told = _Told(work, options, log, stack)
+        told = _Told(options, log, stack)
         return work.run(
             jobs=options["jobs"],
             threads=options["threads"],
@@ -438,27 +426,19 @@ def _engine(work: Batch, options: BatchOptions, log: Callable[[str, int], None])
     )
 
 
-_LARGE_SOURCE = 100_000_000
-"""Bytes of source from which on it is worth to look how much will come out."""
-
-
 class _Told:
     """The bar over all sequences, and a line for each failure."""
 
     def __init__(
-        self, work: Batch, options: BatchOptions, log: Callable[[str, int], None], stack: ExitStack
+        self, options: BatchOptions, log: Callable[[str, int], None], stack: ExitStack
     ) -> None:
-        self._work, self._options, self._log, self._stack = work, options, log, stack
+        self._options, self._log, self._stack = options, log, stack
         self._bar: Any = None
 
     def begun(self, tasks: list[Task]) -> None:
         self._log(reasons(tasks), 0)
-        total = sum(task.state.bytes for task in tasks if task.why)
-        if total > _LARGE_SOURCE:
-            coming = self._work.forecast(tasks, self._options["jobs"], self._options["threads"])
-            if coming is not None and coming.is_much(self._work.dest):
-                self._log(coming.text(self._work.dest), 0)
         if self._options["progress"]:
+            total = sum(task.state.bytes for task in tasks if task.why)
             self._bar = self._stack.enter_context(
                 bars.bar(total=total, unit="B", unit_scale=True, desc="batch")
             )
@@ -558,68 +538,3 @@ def reasons(tasks: Sequence[Task]) -> str:
     kept = count.pop("kept", 0)
     told = [f"{number} {why}" for why, number in count.items()]
     return ", ".join([*told, *([f"{kept} kept"] if kept else [])])
-
-
-# ---- Forecast of the events, bytes and time of a batch, from short parts of some sequences.
-
-
-_LOOKED_AT = 6
-_SHARE = 0.1
-"""Longest time of a forecast, as a share of the time of the batch."""
-
-_FAR_APART = 5.0
-"""Factor from which on it is said how far sequences differ."""
-
-
-def forecast(tasks: Sequence[Task], job_of: Callable[[Task], Job], jobs: int) -> Estimate | None:
-    """Estimate the conversion of all `tasks`; None where there is too little to tell.
-
-    A sequence is sampled with a probability in proportion to its bytes, at even steps along all of
-    them.  Then the mean over the sample of the events from each byte, times all bytes, is an
-    unbiased estimate of the total (Hansen and Hurwitz, 1943, doi:10.1214/aoms/1177731356).
-
-    It takes about a tenth of the time of the conversion at most, which is too little where
-    sequences are few and short.
-
-    Parameters
-    ----------
-    job_of : callable
-        Returns the conversion of a task.
-    jobs : int
-        Conversions at a time.
-    """
-    total = sum(max(1, task.state.bytes) for task in tasks)
-    marks = [(k + 0.5) * total / _LOOKED_AT for k in range(_LOOKED_AT)]
-    chosen, end = [], 0
-    for task in tasks:
-        begin, end = end, end + max(1, task.state.bytes)
-        if weight := sum(begin <= mark < end for mark in marks):
-            chosen.append((task, weight))
-    middle = len(chosen) // 2  # begin there, as what is looked at may be less than all
-    rates: list[tuple[float, float, float]] = []
-    looked_at, spent = 0, 0.0
-    for task, weight in chosen[middle:] + chosen[:middle]:
-        if rates and spent > _SHARE * total * sum(rate[2] for rate in rates) / len(rates):
-            break
-        job, size = job_of(task), max(1, task.state.bytes)
-        share = _SHARE * total / size * weight / _LOOKED_AT
-        how: dict[str, Any] = {"threads": job.threads, "share": share, **job.options}
-        try:
-            found = estimate(job.source, job.output, config_of(job), **how)
-            if found is None and not rates:  # it alone may have all of it
-                how["share"] *= _LOOKED_AT / weight
-                found = estimate(job.source, job.output, config_of(job), **how)
-        except (Adv2eError, OSError):  # what is wrong is told when it is converted
-            continue
-        if found is not None:
-            rates += [(found.events / size, found.bytes / size, found.seconds / size)] * weight
-            looked_at += 1
-            spent += found.spent
-    if not rates:
-        return None
-    events, made, seconds = (total * sum(one) / len(rates) for one in zip(*rates, strict=True))
-    basis = f"short parts of {looked_at} of {len(tasks)} sequences"
-    least, most = min(rates)[0], max(rates)[0]
-    if least and most / least > _FAR_APART:
-        basis += f"; from a byte of source, some make {most / least:.0f} times as many as others"
-    return Estimate(events, made, seconds / jobs, basis, spent)

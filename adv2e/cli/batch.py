@@ -16,10 +16,6 @@ if TYPE_CHECKING:
     from adv2e.batches.run import Batch
     from adv2e.cli.options import Log
 
-_UNKNOWN = (
-    "how much comes and how long it takes is not known: a tenth of the work tells nothing of it"
-)
-
 
 @click.command("batch", cls=Command)
 @click.argument("source", metavar="SOURCE", shell_complete=completion.files)
@@ -73,7 +69,7 @@ def command(
     how: Any = {**given, "sets": sets, "seed": seed, "effects": effect_files}
     how["overwrite"] = overwrite
     if dry_run:
-        _tell_of(open_batch(source, dest, config_files, **how), given, log)
+        _tell_of(open_batch(source, dest, config_files, **how), log)
         return
     outcome = batch(source, dest, config_files, log=log, progress=progress, **how)
     lines = table(outcome)
@@ -87,7 +83,7 @@ def command(
         raise click.exceptions.Exit(1)
 
 
-def _tell_of(work: Batch, given: BatchOptions, log: Log) -> None:
+def _tell_of(work: Batch, log: Log) -> None:
     from adv2e.batches.run import reasons
 
     tasks = work.plan()
@@ -96,6 +92,3 @@ def _tell_of(work: Batch, given: BatchOptions, log: Log) -> None:
     click.echo(reasons(tasks))
     for line in work.passed:
         log(shown(line))
-    if any(task.why and not task.only_export for task in tasks):
-        coming = work.forecast(tasks, given["jobs"], given["threads"])
-        click.echo(coming.text(work.dest) if coming else _UNKNOWN)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -17,7 +16,6 @@ from adv2e.options import ConvertOptions
 if TYPE_CHECKING:
     from adv2e.cli.options import Log
     from adv2e.config import Config
-    from adv2e.conversion.reading import Reading
     from adv2e.geometry import Size
 
 _ENDED = "capture ended: what came is converted; a second Ctrl-C stops at once and keeps nothing"
@@ -81,11 +79,6 @@ def command(
     # effects of others may compile what SciPy computes for Numba, which that import leaves out
     is_ours = not click.get_current_context().params["effect_files"]
 
-    def ready(reading: Reading, chosen: Config) -> None:
-        gc.freeze()  # all that was imported stays; looking through it for garbage takes its time
-        if output != "-" and reading.is_open:
-            _tell_of_much(reading, chosen, Path(output or "events.h5"), wanted, log)
-
     summary = convert_input(
         source,
         output,
@@ -94,7 +87,7 @@ def command(
         also_read=options.files_given,
         log=log,
         begin=import_ahead if is_ours else lambda: None,
-        ready=ready,
+        ready=gc.freeze,  # what was imported stays; looking through it for garbage takes time
         capturing=_ENDED if log.level >= 0 else "",
         **wanted,
     )
@@ -108,17 +101,3 @@ def _configured() -> str:
     names = {item.name: item.opts[-1] for item in context.command.params}
     asked = ("config_files", "sets", "seed", "effect_files")
     return next((names[name] for name in asked if context.params[name] not in ((), None)), "")
-
-
-def _tell_of_much(
-    reading: Reading, config: Config, output: Path, wanted: dict[str, Any], log: Log
-) -> None:
-    """Warn of a very large output, or of one larger than the free disk space, by an estimate."""
-    from adv2e.conversion.estimate import estimate, may_be_much
-
-    if not may_be_much(reading.source):
-        return
-    found = estimate(reading.source.path, output, config, **wanted)
-    folder = output.absolute().parent
-    if found is not None and found.is_much(folder):
-        log(found.text(folder))

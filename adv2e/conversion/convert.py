@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from adv2e.config import Config, Written
     from adv2e.conversion.pipeline import Summary
-    from adv2e.conversion.reading import Reading
     from adv2e.geometry import Size
 
 
@@ -108,7 +107,7 @@ def convert_input(
     log: Callable[[str], None],
     doubt: Callable[[str], None] | None = None,
     begin: Callable[[], None] = lambda: None,
-    ready: Callable[[Reading, Config], None] = lambda reading, config: None,
+    ready: Callable[[], None] = lambda: None,
     capturing: str | None = None,
     **options: Unpack[ConvertOptions],
 ) -> Summary:
@@ -130,7 +129,7 @@ def convert_input(
     begin : callable
         Is called first of all where frames are simulated.
     ready : callable
-        Is called with the open input and the configuration before the simulation.
+        Is called before the simulation, when all is imported and opened.
     capturing : str, optional
         What is told where Ctrl-C ends the frames of a pipe; default: it ends the conversion.
     **options
@@ -158,7 +157,7 @@ def convert_input(
 
         of_raw_video = options["crop"] is not None and options["pixel_format"] is not None
         ready_config = config(None if of_raw_video else size_of(options))
-        ready(reading, ready_config)
+        ready()
         return convert_reading(
             reading,
             output,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import shutil
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -75,14 +74,6 @@ def digest_of_values(*values: Any) -> str:
     """Return the SHA-256 of values that can be written as JSON."""
     text = json.dumps(values, sort_keys=True, ensure_ascii=True, allow_nan=False)
     return hashlib.sha256(text.encode("ascii")).hexdigest()
-
-
-def free_bytes(folder: Path) -> int:
-    """Return the room on the disk on which a folder lies, or will."""
-    there = folder.absolute()
-    while not there.exists():
-        there = there.parent
-    return shutil.disk_usage(there).free
 
 
 def _files(path: Path) -> Iterator[tuple[str, Path]]:

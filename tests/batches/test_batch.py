@@ -71,8 +71,7 @@ def test_again_it_keeps_what_is_there_and_makes_what_changed(batch, source, tmp_
     assert "2 the seed changed" in batch(*call, "--set", "pixel.leak=null", "--seed", 3).err
     clip(root / "c.avi")
     planned = batch(*call, "--set", "pixel.leak=null", "--seed", 3, "--dry-run")
-    # a tenth of three frames tells nothing
-    assert planned.out.startswith("1 new, 2 kept\nhow much comes")
+    assert planned.out == "1 new, 2 kept\n"
     assert not (dest / "c.h5").exists()
 
 
