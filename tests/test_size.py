@@ -20,11 +20,11 @@ PACKAGE = Path(adv2e.__file__).parent
 LIMITS = {
     "": 1490,
     "batches": 1350,
-    "cli": 1300,
+    "cli": 1230,
     "comparison": 1165,
     "compilation": 285,
     "config": 1315,
-    "conversion": 1320,
+    "conversion": 1195,
     "diagnosis": 8320,
     "effects": 1615,
     "exporting": 480,
@@ -45,7 +45,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 333
+FILES = 332
 """Most modules of all packages together."""
 
 _SLACK = 60
