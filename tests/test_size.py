@@ -39,7 +39,7 @@ LIMITS = {
     "rendering": 740,
     "reports": 1791,
     "representations": 112,
-    "side": 805,
+    "side": 840,
     "sources": 3680,
     "synthetic": 160,
 }

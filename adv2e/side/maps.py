@@ -3,7 +3,8 @@
 ========== ===================================== ================================================
 kind       read                                  written
 ========== ===================================== ================================================
-``masks``  PNG, ``.npy``                         as they were read
+``masks``  PNG, ``.npy``                         as they were read; of a PNG with a palette, the
+                                                 indices are the numbers, and the palette stays
 ``depth``  PNG, ``.npy``                         as they were read: they do not change with scale
 ``flow``   PNG of KITTI and DSEC, ``.flo``,      ``.npy``, float32 (rows, columns, 2): columns and
            ``.npy`` (rows, columns, 2)           rows moved [px of the sensor]; NaN: not known
@@ -25,7 +26,8 @@ from __future__ import annotations
 
 import io
 import struct
-from collections.abc import Callable, Iterator, Sequence
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any
@@ -44,6 +46,9 @@ from adv2e.sources.times.rates import NUMBER, nine_decimals, parse_ns
 SUFFIXES = (".png", ".npy", ".flo")
 _FLO = 202021.25
 _HEAD = struct.Struct("<fii")
+_PNG, _COLOUR = b"\x89PNG\r\n\x1a\n", 25
+"""Of a PNG: how it begins, and where the kind of its colours stands, behind the bits of each."""
+_GREY, _INDEXED = b"\0", b"\3"
 
 
 @dataclass(frozen=True)
@@ -127,7 +132,8 @@ class Maps:
             suffix = PurePosixPath(self.names[number]).suffix.lower()
             suffix = ".npy" if self.kind == "flow" else suffix
             name = f"{self.kind}/{len(lines):08d}{suffix}"
-            yield name, _encoded(made, suffix)
+            palette = _palette(self.read(self.names[number])) if self.kind == "masks" else b""
+            yield name, _encoded(made, suffix, palette)
             lines.append(" ".join([*map(nine_decimals, times[number]), name]) + "\n")
         yield f"{self.kind}.txt", "".join(lines).encode()
         if wrong:
@@ -184,6 +190,8 @@ def decoded(data: bytes, label: str, kind: str) -> NDArray[Any]:
             form = "(rows, columns, 2)" if kind == "flow" else "(rows, columns)"
             raise DataError(f"{label}: shape {found.shape}, must be {form}")
         return found
+    if kind == "masks" and _palette(data):
+        return _indices(data, label)
     image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
     if image is None:
         raise DataError(f"{label}: not a PNG that can be read")
@@ -196,11 +204,54 @@ def decoded(data: bytes, label: str, kind: str) -> NDArray[Any]:
     return flow
 
 
-def _encoded(array: NDArray[Any], suffix: str) -> bytes:
+def _encoded(array: NDArray[Any], suffix: str, palette: bytes) -> bytes:
     if suffix == ".png":
         done, data = cv2.imencode(".png", array)
         assert done
-        return data.tobytes()
+        return _with_palette(data.tobytes(), palette) if palette else data.tobytes()
     file = io.BytesIO()
     np.save(file, array)
     return file.getvalue()
+
+
+# ---- A PNG of indices has the same data as a grey one, another head, and a palette (PNG, third
+# edition, W3C 2025, section 4.4); OpenCV reads its colours alone.
+
+
+def _palette(data: bytes) -> bytes:
+    """Return the palette of a PNG; empty where it has none."""
+    if data[:8] != _PNG or data[_COLOUR : _COLOUR + 1] != _INDEXED:
+        return b""
+    return next((body for kind, body in _chunks(data) if kind == b"PLTE"), b"")
+
+
+def _indices(data: bytes, label: str) -> NDArray[Any]:
+    kept = (pair for pair in _chunks(data) if pair[0] in (b"IHDR", b"IDAT", b"IEND"))
+    grey = _joined(kept, _GREY)
+    image = cv2.imdecode(np.frombuffer(grey, np.uint8), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise DataError(f"{label}: not a PNG that can be read")
+    return np.asarray(image // (255 // (2 ** data[_COLOUR - 1] - 1)))
+
+
+def _with_palette(grey: bytes, palette: bytes) -> bytes:
+    head, *rest = _chunks(grey)
+    return _joined([head, (b"PLTE", palette), *rest], _INDEXED)
+
+
+def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    at = len(_PNG)
+    while at + 12 <= len(data):
+        (size,) = struct.unpack_from(">I", data, at)
+        yield data[at + 4 : at + 8], data[at + 8 : at + 8 + size]
+        at += 12 + size
+
+
+def _joined(chunks: Iterable[tuple[bytes, bytes]], colour: bytes) -> bytes:
+    """Return a PNG of chunks, whose head says how its numbers are to be taken."""
+    made = bytearray(_PNG)
+    for kind, body in chunks:
+        own = body[:9] + colour + body[10:] if kind == b"IHDR" else body
+        made += struct.pack(">I", len(own)) + kind + own
+        made += struct.pack(">I", zlib.crc32(kind + own))
+    return bytes(made)

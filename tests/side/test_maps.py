@@ -2,6 +2,7 @@
 
 import io
 import struct
+import zlib
 
 import cv2
 import numpy as np
@@ -64,6 +65,36 @@ def test_masks_and_depth_keep_their_numbers(array):
         files = dict(made.written(SAME, CLOCK))
         assert np.array_equal(decoded(files[f"{kind}/00000000.png"], "a.png", kind), array)
         assert files[f"{kind}.txt"].startswith(b"0.000000030 ")  # c.png is the third frame
+
+
+def indexed(array, palette, bits):
+    """Return a PNG of indices, written by the letter of the specification."""
+    rows, columns = array.shape
+    flat = np.unpackbits(array[..., None].astype(np.uint8), axis=2)[..., 8 - bits :]
+    lines = np.packbits(flat.reshape(rows, -1), axis=1)
+    data = zlib.compress(b"".join(b"\0" + line.tobytes() for line in lines))
+    head = struct.pack(">IIBBBBB", columns, rows, bits, 3, 0, 0, 0)
+    parts = (b"IHDR", head), (b"PLTE", palette.tobytes()), (b"IDAT", data), (b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+        for kind, body in parts
+    )
+
+
+@pytest.mark.parametrize("bits", [1, 2, 4, 8])
+def test_a_mask_with_a_palette_keeps_its_indices_and_colours(bits):
+    draws = np.random.default_rng(bits)
+    classes = draws.integers(0, min(2**bits, 21), (3, 4))
+    palette = draws.integers(0, 256, (2**bits, 3), dtype=np.uint8)
+    file = indexed(classes, palette, bits)
+    assert np.array_equal(decoded(file, "a.png", "masks"), classes)
+    place = Placement(Size(4, 3), Size(8, 6), turned=True, scale=(2.0, 2.0))
+    files = dict(Maps("masks", "m", ["a.png"], lambda name: file).written(place, CLOCK))
+    grown = np.repeat(np.repeat(classes[::-1, ::-1], 2, 0), 2, 1)
+    made = files["masks/00000000.png"]
+    assert np.array_equal(decoded(made, "a.png", "masks"), grown)
+    seen = cv2.imdecode(np.frombuffer(made, np.uint8), cv2.IMREAD_COLOR)
+    assert np.array_equal(seen[..., ::-1], palette[grown])
 
 
 def test_files_that_are_of_no_frame_are_not_taken_for_those_of_others():
