@@ -129,9 +129,9 @@ _KEPT_BYTES = 3 << 30
 _kept: dict[bytes, list[NDArray[Any]]] = {}
 
 
-def _remembering(sampling: Sampling, *, threads: int = 1) -> Upsampler:
+def _remembering(sampling: Sampling, **options: Any) -> Upsampler:
     """Return what :func:`make_upsampler` does, with its frames remembered."""
-    return _Remembered(make_upsampler(sampling, threads=threads), repr(sampling), _kept)
+    return _Remembered(make_upsampler(sampling, **options), repr(sampling), _kept)
 
 
 QUIET = {"leak_rate_hz": 0.0, "shot_noise_rate_hz": 0.0}
