@@ -18,18 +18,18 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1470,
-    "batches": 1340,
+    "": 1520,
+    "batches": 1420,
     "cli": 1300,
     "comparison": 1165,
     "compilation": 285,
     "config": 1305,
-    "conversion": 1190,
+    "conversion": 1195,
     "diagnosis": 8230,
     "effects": 1548,
-    "exporting": 470,
+    "exporting": 1045,
     "files": 780,
-    "formats": 5055,
+    "formats": 5070,
     "inspection": 260,
     "kernel": 5940,
     "light": 865,
@@ -38,13 +38,13 @@ LIMITS = {
     "process": 265,
     "rendering": 740,
     "reports": 1800,
-    "representations": 112,
+    "representations": 140,
     "sources": 3610,
     "synthetic": 160,
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 324
+FILES = 330
 """Most modules of all packages together."""
 
 _SLACK = 60

@@ -11,7 +11,7 @@ import platform
 import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -57,6 +57,10 @@ BEHIND_BYTES = 16 << 20
 
 BEHIND_TASKS = 1000
 """Most pieces of events and frames that were made and not written yet."""
+
+
+Opening = Callable[..., AbstractContextManager[Any]]
+"""Opens an output, with the arguments of :func:`adv2e.formats.writing.open_sink`."""
 
 
 @dataclass(frozen=True)
@@ -160,6 +164,7 @@ def convert_reading(
     also_read: Iterable[str | Path] = (),
     log: Callable[[str], None] = lambda text: None,
     doubt: Callable[[str], None] | None = None,
+    opening: Opening = open_sink,
     **options: Unpack[SimulatedOutput],
 ) -> Summary:
     """Convert one video, image sequence or recording to events.
@@ -177,6 +182,8 @@ def convert_reading(
         Files that `config` is made of, which must not be written over.
     log, doubt : callable
         Take lines for people; `doubt` those that ask for a look, by default `log`.
+    opening : callable
+        Returns what takes the events, as :func:`adv2e.formats.writing.open_sink` does.
     **options
         See :class:`adv2e.options.SimulatedOutput`.
 
@@ -204,7 +211,7 @@ def convert_reading(
     inputs = (*reading.inputs, *also_read)
     with Staging(options["overwrite"], inputs) as staging, ExitStack() as stack:
         sink = stack.enter_context(
-            open_sink(
+            opening(
                 target,
                 width=width,
                 height=height,
