@@ -327,8 +327,8 @@ class Clock(TypedDict, total=False):
     ]
 
 
-class SourceOptions(FrameInput, Part, Clock, total=False):
-    """Options of an input with frames that are simulated."""
+class MotionOptions(TypedDict, total=False):
+    """Options of pictures before which the sensor moves."""
 
     motion: Annotated[
         "str | None",
@@ -360,6 +360,10 @@ class SourceOptions(FrameInput, Part, Clock, total=False):
             metavar="S",
         ),
     ]
+
+
+class SourceOptions(FrameInput, Part, Clock, MotionOptions, total=False):
+    """Options of an input with frames that are simulated."""
 
 
 Overwrite = Annotated[bool, Option(help="Replace an output that exists.", default=False)]
@@ -633,18 +637,21 @@ class RenderedPart(FilmOptions, total=False):
     progress: Progress
 
 
+StyleName = Annotated[
+    str,
+    Option(
+        help="white, black: coloured events on that ground. grey: the net count of events, as"
+        " v2e draws it. surface: colours that fade with age.",
+        default="white",
+        choices=("white", "black", "grey", "surface"),
+    ),
+]
+
+
 class RenderOptions(RenderedPart, EventInput, total=False):
     """Options of pictures and films of events."""
 
-    style: Annotated[
-        str,
-        Option(
-            help="white, black: coloured events on that ground. grey: the net count of events, as"
-            " v2e draws it. surface: colours that fade with age.",
-            default="white",
-            choices=("white", "black", "grey", "surface"),
-        ),
-    ]
+    style: StyleName
     on_color: Annotated[
         str,
         Option(help="Colour of ON events: a name or #rrggbb.", default="red", metavar="COLOR"),
@@ -668,9 +675,9 @@ class RenderOptions(RenderedPart, EventInput, total=False):
 WindowUs = Annotated[
     "int | None",
     Option(
-        help="Cut the events into windows of TIME, such as 33ms: of voxel grids; of pictures for"
-        " ev-segnet the time before each image.",
-        usual="ev-segnet: 50ms; voxel of 'adv2e batch': from image to image",
+        help="Cut the events into windows of TIME, such as 33ms: of voxel, histogram, surface,"
+        " picture and rvt; for ev-segnet the time before each image.",
+        usual="rvt, ev-segnet: 50ms; voxel and the like of 'adv2e batch': from image to image",
         flags=("--window",),
         kind="time",
         metavar="TIME",
@@ -679,19 +686,37 @@ WindowUs = Annotated[
 
 
 Bins = Annotated[
-    int,
+    "int | None",
     Option(
-        help="Temporal bins of a voxel grid (voxel).",
-        default=5,
+        help="Bins of time of voxel, histogram and rvt.",
+        usual="5; of histogram and rvt 10",
         kind="count",
         most=10_000,
         metavar="N",
     ),
 ]
 
+Cutoff = Annotated[
+    int,
+    Option(
+        help="Largest count of histogram and rvt.", default=10, kind="count", most=255, metavar="N"
+    ),
+]
 
-class VoxelOptions(TypedDict, total=False):
-    """Options of an export of voxel grids."""
+Valid = Annotated[
+    float,
+    Option(
+        help="Share that is held out, for validation or test: of the recordings, each by its name;"
+        " of the images for e2vid of one recording.",
+        default=0.2,
+        kind="share",
+        metavar="SHARE",
+    ),
+]
+
+
+class WindowOptions(TypedDict, total=False):
+    """Options of an export of something for each window."""
 
     window_us: WindowUs
     count: Annotated[
@@ -709,6 +734,12 @@ class VoxelOptions(TypedDict, total=False):
             metavar="N",
         ),
     ]
+    valid: Valid
+
+
+class VoxelOptions(WindowOptions, total=False):
+    """Options of an export of voxel grids."""
+
     bins: Bins
     normalise: Annotated[
         str,
@@ -769,22 +800,75 @@ class SegmentationOptions(TypedDict, total=False):
     ]
 
 
-class TrainingOptions(TypedDict, total=False):
-    """Options of an export of a training set for E2VID."""
+class HistogramOptions(WindowOptions, total=False):
+    """Options of an export of stacked histograms."""
 
-    valid: Annotated[
-        float,
+    bins: Bins
+    cutoff: Cutoff
+
+
+class SurfaceOptions(WindowOptions, total=False):
+    """Options of an export of time surfaces."""
+
+    tau_us: Annotated[
+        "int | None",
         Option(
-            help="Share that is for validation: of the recordings, or of the images if there is"
-            " one.",
-            default=0.2,
-            kind="share",
-            metavar="SHARE",
+            help="Time in which a time surface falls to 1/e, such as 30ms.",
+            usual="50ms",
+            flags=("--tau",),
+            kind="time",
+            metavar="TIME",
         ),
     ]
 
 
-EXPORTS = {"voxel": VoxelOptions, "ev-segnet": SegmentationOptions, "e2vid": TrainingOptions}
+class PictureOptions(WindowOptions, total=False):
+    """Options of an export of pictures of events."""
+
+    style: StyleName
+
+
+class RvtOptions(TypedDict, total=False):
+    """Options of an export for RVT."""
+
+    window_us: WindowUs
+    bins: Bins
+    cutoff: Cutoff
+    valid: Valid
+
+
+class SetOptions(TypedDict, total=False):
+    """Options of an export of a training set without others of its own."""
+
+    valid: Valid
+
+
+class TrainingOptions(SetOptions, total=False):
+    """Options of an export of a training set for E2VID."""
+
+    flow: Annotated[
+        "str | None",
+        Option(
+            help="Optical flow for e2vid. estimated: found from image to image.",
+            usual="that beside the events, if there is any",
+            choices=("none", "estimated"),
+        ),
+    ]
+
+
+EXPORTS = {
+    "voxel": VoxelOptions,
+    "histogram": HistogramOptions,
+    "surface": SurfaceOptions,
+    "picture": PictureOptions,
+    "ev-segnet": SegmentationOptions,
+    "e2vid": TrainingOptions,
+    "evreal": SetOptions,
+    "rvt": RvtOptions,
+    "dsec": SetOptions,
+    "spikingjelly": SetOptions,
+    "nmnist": SetOptions,
+}
 """Options of each kind of export, by its name."""
 
 
@@ -798,7 +882,7 @@ LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "images", "videos")
 """Trees of sequences that a batch knows."""
 
 
-class BatchOptions(AnyFrames, Part, Clock, Content, Blurred, Run, total=False):
+class BatchOptions(AnyFrames, Part, Clock, MotionOptions, Content, Blurred, Run, total=False):
     """Options of a batch."""
 
     layout: Annotated[str, Option(help="Which sequences count.", default="auto", choices=LAYOUTS)]
@@ -812,6 +896,14 @@ class BatchOptions(AnyFrames, Part, Clock, Content, Blurred, Run, total=False):
             help="Make a training set of the events of each sequence, too, as 'adv2e export' does."
             " Stores the frames where it needs them.",
             choices=tuple(EXPORTS),
+        ),
+    ]
+    no_events: Annotated[
+        bool,
+        Option(
+            help="Keep no events: --export makes voxel grids, histograms, surfaces or pictures"
+            " while it simulates.",
+            default=False,
         ),
     ]
     window_us: WindowUs

@@ -72,7 +72,7 @@ class Wanted:
         """Return the folder for the export of a sequence; None without an export."""
         if self.export is None:
             return None
-        return self.dest / f"{sequence.name}.{self.export.kind}"
+        return self.dest / self.export.place(sequence.name)
 
 
 def seed_of(seed: int, name: str) -> int:

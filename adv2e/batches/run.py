@@ -26,7 +26,7 @@ from adv2e.batches.plan import (
 )
 from adv2e.batches.sequences import Sequence as Found
 from adv2e.batches.sequences import find_sequences
-from adv2e.batches.work import Engine, Export, Job, write_lists
+from adv2e.batches.work import Engine, Export, Job
 from adv2e.config import Family, Written, load_family, to_dict
 from adv2e.config.active_effects import user_sources
 from adv2e.config.user_effects import load_effects
@@ -35,7 +35,17 @@ from adv2e.files.regular import shown
 from adv2e.files.states import digest_of_values, state_of
 from adv2e.formats.registry import check_frames, to_write
 from adv2e.light.interpolation import network_of
-from adv2e.options import AnyFrames, BatchOptions, Clock, Part, declared, size_of, takes
+from adv2e.options import (
+    EXPORTS,
+    AnyFrames,
+    BatchOptions,
+    Clock,
+    MotionOptions,
+    Part,
+    declared,
+    size_of,
+    takes,
+)
 from adv2e.process import bars
 
 if TYPE_CHECKING:
@@ -165,7 +175,13 @@ class Batch:
         self.dest, self._settings, self._overwrite = dest, settings, overwrite
         self.manifest = manifest_path(dest, shard)
         self._wanted = settings.wanted(dest)
-        found = find_sequences(source, layout, leave_out=dest, fps=settings.options.get("fps"))
+        found = find_sequences(
+            source,
+            layout,
+            leave_out=dest,
+            fps=settings.options.get("fps"),
+            stills="motion" in settings.options,
+        )
         self._sequences, self.passed = found.sequences, found.told()
         self._passed = sum(map(len, found.passed.values()))
         self._states = {one.name: state_of(one.source) for one in self._sequences}
@@ -255,8 +271,8 @@ class Batch:
                 if wrong := error_of(found):
                     failed[job.name] = wrong
                 ended(waiting[job.name], record)
-            if self._wanted.export is not None and self._wanted.export.kind == "e2vid":
-                write_lists(self.dest, read_records(self.dest).values())
+            if self._wanted.export is not None:
+                self._wanted.export.write_lists(self.dest, read_records(self.dest).values())
         return Outcome(tasks, failed, events, self._passed, tuple(self.passed))
 
 
@@ -364,7 +380,7 @@ def open_batch(
     if options["with_frames"]:
         check_frames(format)
     # what was made before an option came to be is up to date without it
-    usual = declared(AnyFrames, Part, Clock)
+    usual = declared(AnyFrames, Part, Clock, MotionOptions)
     asked = {
         name: value
         for name, value in options.items()
@@ -378,6 +394,17 @@ def open_batch(
         **{name: options[name] for name in ("side", "blurred_frames") if options[name]},
     }
     suffix = next(iter(format.suffixes))
+    if options["no_events"]:
+        if export is None or not export.has_windows:
+            raise UsageError("--no-events is for --export voxel, histogram, surface and picture")
+        if options["causes"] or options["with_frames"]:
+            raise UsageError("--no-events keeps no --causes and --with-frames: leave them out")
+        from adv2e.exporting.layouts import chosen_options  # noqa: PLC0415 - takes its time
+
+        group = EXPORTS[export.kind]
+        given = {name: one.default for name, one in declared(group).items()} | export.options()
+        asked["streamed"] = {"to": export.kind, **chosen_options(export.kind, given)}
+        asked["with_frames"], suffix, export = False, f".{export.kind}", None
     files = tuple(map(str, effects))
     settings = Settings(config, tuple(sets), files, seed, suffix, asked, export)
     shard = None if options["shard"] is None else parse_shard(options["shard"])
@@ -394,11 +421,11 @@ def open_batch(
 def _export(options: BatchOptions, format: Format) -> Export | None:
     """Return the settings of --export, None without; UsageError if other options do not fit it."""
     kind, window_us, bins = options["export"], options["window_us"], options["bins"]
-    bins = Export.bins if bins is None else bins
-    if window_us is not None and kind not in ("voxel", "ev-segnet"):
-        raise UsageError("--window is for --export voxel and --export ev-segnet")
-    if bins != Export.bins and kind != "voxel":
-        raise UsageError("--bins is for --export voxel")
+    for name, value in (("window_us", window_us), ("bins", bins)):
+        having = [one for one, group in EXPORTS.items() if name in declared(group)]
+        if value is not None and kind not in having:
+            flag = declared(BatchOptions)[name].flag_of(name)
+            raise UsageError(f"{flag} is for --export {', '.join(having[:-1])} and {having[-1]}")
     if kind is None:
         return None
     export = Export(kind, window_us, bins)

@@ -82,7 +82,12 @@ class Found:
 
 
 def find_sequences(
-    root: Path, layout: str = "auto", *, leave_out: Path | None = None, fps: Rate | None = None
+    root: Path,
+    layout: str = "auto",
+    *,
+    leave_out: Path | None = None,
+    fps: Rate | None = None,
+    stills: bool = False,
 ) -> Found:
     """Return the sequences below a folder; or that of a file.
 
@@ -96,6 +101,8 @@ def find_sequences(
         Folder in which nothing is looked for: that of the results.
     fps : float, Fraction or str, optional
         All frames are at this rate: sequences need no times of their own.
+    stills : bool
+        Each picture is a sequence, and nothing else is.
 
     Raises
     ------
@@ -105,7 +112,7 @@ def find_sequences(
     if not root.exists():
         raise DataError(f"{root}: no such file or folder")
     avoided = None if leave_out is None else leave_out.resolve()
-    walk = _Walk(avoided, fps)
+    walk = _Walk(avoided, fps, stills)
     seen = list(walk.below(root))
     if (root, "images") in seen and len(seen) > 1:
         seen.remove((root, "images"))
@@ -122,7 +129,9 @@ def find_sequences(
     result = Found(sorted(sequences, key=lambda one: natural_key(one.name)), passed)
     if not sequences:
         nothing = f"holds no sequence of the layout {layout}"
-        if layout == "auto":
+        if stills:
+            nothing = "holds no picture, before which --motion moves"
+        elif layout == "auto":
             nothing = "holds no video, and no recording or folder with frames and their times"
         raise DataError("; ".join([f"{root}: {nothing}", *result.told()]))
     return result
@@ -131,8 +140,8 @@ def find_sequences(
 class _Walk:
     """A walk through folders, which finds sequences and notes what it passes over."""
 
-    def __init__(self, avoided: Path | None, fps: Rate | None) -> None:
-        self._avoided, self._fps = avoided, fps
+    def __init__(self, avoided: Path | None, fps: Rate | None, stills: bool) -> None:
+        self._avoided, self._fps, self._stills = avoided, fps, stills
         self.passed: dict[str, list[Path]] = {}
 
     def below(self, root: Path) -> Iterator[tuple[Path, str]]:
@@ -146,7 +155,7 @@ class _Walk:
             return
         for place, folders, names in os.walk(root, onerror=fail):
             here = Path(place)
-            if kind := _kind_of_folder(here):
+            if not self._stills and (kind := _kind_of_folder(here)):
                 folders.clear()
                 yield here, kind
                 continue
@@ -157,6 +166,9 @@ class _Walk:
                 and (self._avoided is None or (here / one).resolve() != self._avoided)
             )
             shown = sorted(name for name in names if not name.startswith("."))
+            if self._stills:
+                yield from self._in_files([here / name for name in shown])
+                continue
             images = [name for name in shown if _suffix(name) in IMAGE_SUFFIXES]
             pages = [name for name in images if _suffix(name) in _PAGES]
             if pages and _is_stack(here / pages[0]):
@@ -195,6 +207,8 @@ class _Walk:
     def _kind_of_file(self, path: Path) -> tuple[str, str]:
         """Return the layout of a file, or why it has none: "" of one that nobody would take."""
         suffix = path.suffix.lower()
+        if self._stills:
+            return ("auto", "") if suffix in IMAGE_SUFFIXES else ("", "no picture to move before")
         if suffix in VIDEO_SUFFIXES:
             return "videos", ""
         if suffix in (".npy", *_PAGES):

@@ -6,15 +6,17 @@ import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from adv2e.config import Config, from_dict
 from adv2e.config.user_effects import load_effects
-from adv2e.errors import Adv2eError, is_for_users
+from adv2e.errors import Adv2eError, is_for_users, warn
 from adv2e.files.staging import Staging, writing
 from adv2e.files.states import State, digest_of
 from adv2e.formats.registry import to_write
+from adv2e.in_python import in_python
 from adv2e.process.machine import machine_complaint
 from adv2e.side.carrying import places_of
 
@@ -96,17 +98,26 @@ def _reported(job: Job, error_key: str, work: Callable[[Job], dict[str, Any]]) -
 
 
 def _convert(job: Job) -> dict[str, Any]:
-    from adv2e.conversion.convert import convert  # noqa: PLC0415 - in the process that converts
+    from adv2e.conversion.convert import convert_input  # noqa: PLC0415 - in the process
 
     source, side = digest_of(Path(job.source)), side_of(Path(job.source))
+    notes: list[str] = []
+    how = dict(job.options)
+    streamed = how.pop("streamed", None)
+    if streamed is not None:
+        from adv2e.exporting.streaming import WindowSink  # noqa: PLC0415 - as above
+
+        how["opening"] = partial(WindowSink, streamed["to"], streamed)
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always")
-        made = convert(
-            *(job.source, job.output, config_of(job)),
+        made = convert_input(
+            *(job.source, job.output, lambda size: config_of(job)),
+            log=lambda text: notes.append(in_python(text)),
+            doubt=lambda text: warn(in_python(text)),
             overwrite=True,
             take="frames",
             threads=job.threads,
-            **job.options,
+            **how,
         )
     return {
         "source_sha256": source,
@@ -117,7 +128,7 @@ def _convert(job: Job) -> dict[str, Any]:
         "frames": made.frames,
         "duration_s": made.duration_s,
         "seconds": round(made.seconds, 3),
-        "notes": [*made.notes, *_told(doubts)],
+        "notes": [*notes, *_told(doubts)],
     }
 
 
@@ -138,6 +149,8 @@ def _beside(job: Job) -> Iterator[Path]:
     from adv2e.formats.writing import SIDE  # noqa: PLC0415
 
     output = Path(job.output)
+    if "streamed" in job.options:
+        return
     format = to_write(output, job.options.get("format"))
     if not format.holds_settings:
         yield output.with_name(f"{output.name}.json")
@@ -177,22 +190,57 @@ class Export:
     kind : str
         One of :data:`adv2e.options.EXPORTS`.
     window_us : int, optional
-        Length of the windows [us]; default: for voxel grids, from each image to the next, for
-        Ev-SegNet, 50 ms before each.
-    bins : int
-        Of a voxel grid.
+        Length of the windows [us]; default: for something of each window, from each image to the
+        next; else as ``adv2e export`` has it.
+    bins : int, optional
+        Of time; default: as there.
     """
 
     kind: str
     window_us: int | None = None
-    bins: int = 5
+    bins: int | None = None
+
+    @property
+    def has_windows(self) -> bool:
+        return self.kind in ("voxel", "histogram", "surface", "picture")
+
+    @property
+    def is_set(self) -> bool:
+        """True for what lies in one folder for all sequences."""
+        return self.kind in ("evreal", "rvt", "dsec", "spikingjelly", "nmnist")
 
     @property
     def needs_frames(self) -> bool:
-        return self.kind != "voxel" or self.window_us is None
+        if self.has_windows:
+            return self.window_us is None
+        return self.kind in ("e2vid", "ev-segnet", "evreal", "dsec")
+
+    def place(self, name: str) -> str:
+        """Return where the export of a sequence lies below DEST; DataError if it has no class."""
+        if not self.is_set:
+            return f"{name}.{self.kind}"
+        return f"{self.kind}/{self._row(name)[0]}"
+
+    def _row(self, name: str) -> tuple[str, str, str]:
+        from adv2e.exporting.layouts import LAYOUTS  # noqa: PLC0415 - takes its time
+
+        place, label, split = LAYOUTS[self.kind].place_of(name, _VALID_SHARE)
+        return str(place), label, split
 
     def described(self) -> dict[str, Any]:
-        return asdict(self)
+        # what was made before other kinds came is up to date
+        bins = 5 if self.bins is None and self.kind in _FIVE else self.bins
+        return {**asdict(self), "bins": bins}
+
+    def options(self) -> dict[str, Any]:
+        """Return the arguments of :func:`adv2e.export`."""
+        given = {"window_us": self.window_us, "bins": self.bins}
+        how: dict[str, Any] = {name: one for name, one in given.items() if one is not None}
+        if self.kind == "e2vid":  # which ones are for validation, the lists of the batch say
+            how["valid"] = 0.0
+        if self.has_windows and self.window_us is None:
+            how["at"] = "images"
+        return how
 
     def make(
         self, events: Path, folder: Path, threads: int, doubt: Callable[[str], None]
@@ -204,17 +252,31 @@ class Export:
         Adv2eError
             Something is wrong with the file; then nothing is left.
         """
-        from adv2e.exporting.export import export  # noqa: PLC0415 - in the process that converts
+        from adv2e.exporting import export  # noqa: PLC0415 - in the process that converts
 
-        how: dict[str, Any] = {"window_us": self.window_us}
-        if self.kind == "e2vid":  # which ones are for validation, the lists of the batch say
-            how = {"valid": 0.0}
-        elif self.kind == "voxel":
-            how |= {"bins": self.bins, "at": "images" if self.window_us is None else None}
-        done = export(
-            events, folder, self.kind, overwrite=True, threads=threads, doubt=doubt, **how
-        )
-        return {**self.described(), "items": done.items, "sha256": digest_of(folder)}
+        how: dict[str, Any] = {**self.options(), "threads": threads, "doubt": doubt}
+        if self.is_set:
+            items = export.export_unit(events, folder, self.kind, **how)
+        else:
+            items = export.export(events, folder, self.kind, overwrite=True, **how).items
+        return {**self.described(), "items": items, "sha256": digest_of(folder)}
+
+    def write_lists(self, dest: Path, records: Iterable[Mapping[str, Any]]) -> None:
+        """Write the lists of what was exported of all sequences, where there are some."""
+        of_kind = [one for one in records if one.get("export", {}).get("kind") == self.kind]
+        if self.kind == "e2vid":
+            write_lists(dest, of_kind)
+        elif self.is_set and of_kind:
+            from adv2e.exporting.export import FILES, write_list  # noqa: PLC0415
+
+            with Staging(overwrite=True) as staging, writing(dest):
+                place = staging.file(dest / self.kind / FILES)
+                staging.prepare()
+                write_list(place, [self._row(record["name"]) for record in of_kind])
+
+
+_FIVE = ("voxel", "ev-segnet", "e2vid")
+"""Kinds whose entries tell 5 bins where nothing was asked for."""
 
 
 def write_lists(dest: Path, records: Iterable[Mapping[str, Any]]) -> None:
@@ -225,7 +287,6 @@ def write_lists(dest: Path, records: Iterable[Mapping[str, Any]]) -> None:
     files = [
         (record["seed"], dest.resolve() / f"{record['name']}.e2vid" / "sequences")
         for record in records
-        if record.get("export", {}).get("kind") == "e2vid"
     ]
     files.sort(key=lambda one: (one[0], str(one[1])))
     held = math.ceil(_VALID_SHARE * len(files))

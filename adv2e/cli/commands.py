@@ -20,6 +20,7 @@ _GROUPS = {
     "Output": (
         *("output", "overwrite", "format", "layout", "t0", "with_frames", "preview", "causes"),
         "blurred_frames",
+        *("export", "no_events", "window_us", "bins"),
         "as_json",
     ),
     "Running": ("threads", "jobs", "shard", "scheduler", "dry_run", "progress", "quiet"),

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     "--to",
     required=True,
     type=click.Choice(list(EXPORTS)),
-    help="What to make: voxel grids, pictures for Ev-SegNet, or a training set for E2VID.",
+    help="What to make: something for each window (voxel, histogram, surface, picture), or the"
+    " folders that a trainer opens.",
 )
 @options.declared_options(*EXPORTS.values(), ExportOptions)
 @options.reporting_options
@@ -44,9 +45,12 @@ def command(
       adv2e export clip.zip -o grids --to voxel --at images --bins 5 --normalise e2vid
       adv2e export first.h5 second.h5 -o training --to e2vid
       adv2e export drive.h5 -o segmentation --to ev-segnet
+      adv2e export events/ -o spiking --to spikingjelly
 
-    EVENTS are recordings or event files, simulated or measured. For e2vid, ev-segnet and --at
-    images they must hold images: 'adv2e convert --with-frames' stores them.
+    EVENTS are recordings or event files, simulated or measured; or one folder, of which all below
+    it are exported: folders train, valid and test divide the set, and others name classes. For
+    e2vid, ev-segnet and --at images they must hold images: 'adv2e convert --with-frames' stores
+    them.
     """
     if output is None:
         raise click.UsageError("-o DIR is missing: name the folder to write")

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from adv2e.config import Config, Written
-    from adv2e.conversion.pipeline import Summary
+    from adv2e.conversion.pipeline import Opening, Summary
     from adv2e.geometry import Size
 
 
@@ -109,6 +109,7 @@ def convert_input(
     begin: Callable[[], None] = lambda: None,
     ready: Callable[[], None] = lambda: None,
     capturing: str | None = None,
+    opening: Opening | None = None,
     **options: Unpack[ConvertOptions],
 ) -> Summary:
     """Do what :func:`convert` does; errors name options of the command line.
@@ -132,6 +133,8 @@ def convert_input(
         Is called before the simulation, when all is imported and opened.
     capturing : str, optional
         What is told where Ctrl-C ends the frames of a pipe; default: it ends the conversion.
+    opening : callable, optional
+        Opens the output of a simulation; default: a file of events.
     **options
         See :class:`adv2e.options.ConvertOptions`.
     """
@@ -166,6 +169,7 @@ def convert_input(
             also_read=also_read(),
             log=log,
             doubt=doubt,
+            **({} if opening is None else {"opening": opening}),
             **chosen(SimulatedOutput, options),
         )
 

@@ -12,7 +12,7 @@ import platform
 import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -66,6 +66,10 @@ BEHIND_BYTES = 16 << 20
 
 BEHIND_TASKS = 1000
 """Most pieces of events and frames that were made and not written yet."""
+
+
+Opening = Callable[..., AbstractContextManager[Any]]
+"""Opens an output, with the arguments of :func:`adv2e.formats.writing.open_sink`."""
 
 
 @dataclass(frozen=True)
@@ -178,6 +182,7 @@ def convert_reading(
     also_read: Iterable[str | Path] = (),
     log: Callable[[str], None] = lambda text: None,
     doubt: Callable[[str], None] | None = None,
+    opening: Opening = open_sink,
     **options: Unpack[SimulatedOutput],
 ) -> Summary:
     """Convert one video, image sequence or recording to events.
@@ -195,6 +200,8 @@ def convert_reading(
         Files that `config` is made of, which must not be written over.
     log, doubt : callable
         Take lines for people; `doubt` those that ask for a look, by default `log`.
+    opening : callable
+        Returns what takes the events, as :func:`adv2e.formats.writing.open_sink` does.
     **options
         See :class:`adv2e.options.SimulatedOutput`.
 
@@ -240,7 +247,7 @@ def convert_reading(
     files = _side_files(side, blurred, clock, doubt)
     with Staging(options["overwrite"], inputs) as staging, ExitStack() as stack:
         sink = stack.enter_context(
-            open_sink(
+            opening(
                 target,
                 width=width,
                 height=height,

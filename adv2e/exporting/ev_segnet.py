@@ -22,11 +22,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.exporting.voxels import Slice
+from adv2e.exporting.voxels import Slice, save_picture
 from adv2e.representations.voxel_grid import event_image
 
 DDD17 = (346, 260)
@@ -77,8 +76,6 @@ def write_event_images(
         picture = event_image(kept, (size[0], rows), window, scale_counts=settings.scale_counts)
         stem = f"{name}_export_{number}"
         np.save(events_in / f"{stem}.npy", picture, allow_pickle=False)
-        done, data = cv2.imencode(".png", image[:rows])
-        assert done
-        (images_in / f"{stem}.png").write_bytes(data.tobytes())
+        save_picture(images_in / f"{stem}.png", image[:rows])
         number += 1
     return number

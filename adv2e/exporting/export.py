@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from collections.abc import Sequence as Many
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,43 +16,20 @@ from typing import Any
 from adv2e import __version__
 from adv2e.conversion.transfer import clock_of, side_of
 from adv2e.errors import UsageError, warn
-from adv2e.exporting import e2vid, ev_segnet, voxels
-from adv2e.exporting.sequence import Sequence, open_sequences
-from adv2e.exporting.voxels import (
-    Slice,
-    before_images,
-    between_images,
-    by_count,
-    by_time,
-)
+from adv2e.exporting import e2vid, ev_segnet
+from adv2e.exporting.layouts import LAYOUTS, Layout, check_kind, chosen_options
+from adv2e.exporting.sequence import MADE_BY_US, Sequence, is_tree, open_sequences
+from adv2e.exporting.targets import Targets
+from adv2e.exporting.voxels import before_images
 from adv2e.files.regular import shown
 from adv2e.files.staging import Staging, writing
 from adv2e.formats.reading import events_in_order
 from adv2e.formats.writing import write_side
 from adv2e.in_python import in_python
-from adv2e.options import EXPORTS, MOST_EMPTY, EventInput, ExportOptions, chosen, declared, takes
+from adv2e.options import EXPORTS, EventInput, ExportOptions, chosen, takes
 
-DESCRIPTION = "export.json"
-"""Name of the file that describes an export."""
-
-
-@dataclass(frozen=True)
-class Cutting:
-    """Windows into which events are cut: by time, by count, or at images; one of the three.
-
-    Attributes
-    ----------
-    window_us : int, optional
-        Length of a window [us]; of a picture for Ev-SegNet, that before each image.
-    count : int, optional
-        Events of a window.
-    at_images : bool
-        From each image to the next.
-    """
-
-    window_us: int | None = None
-    count: int | None = None
-    at_images: bool = False
+DESCRIPTION, FILES = MADE_BY_US
+"""Names of the file that describes an export, and of the list of what is in it."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +57,7 @@ def export(
     output: str | Path,
     to: str,
     *,
+    targets: Many[Targets] | None = None,
     doubt: Callable[[str], None] = lambda text: warn(in_python(text)),
     **options: Any,
 ) -> Exported:
@@ -86,11 +66,15 @@ def export(
     Parameters
     ----------
     events : path, or iterable of paths
-        Measured or simulated.  For e2vid, ev-segnet, and windows at images they must hold images.
+        Measured or simulated; or one folder, of which all below it are exported.  For e2vid,
+        ev-segnet, and windows at images they must hold images.
     output : str or Path
         Folder to write.
-    to : {'voxel', 'ev-segnet', 'e2vid'}
-        Voxel grids, pictures for Ev-SegNet, or a training set for E2VID.
+    to : str
+        What to make: one of :data:`adv2e.options.EXPORTS`, such as "voxel" or "rvt".
+    targets : sequence of Targets, optional
+        Boxes and flow of each recording; default: what lies beside it.  See
+        :mod:`adv2e.exporting.targets`.
     doubt : callable
         Takes lines for people that ask for a look; default: they are warnings.
     **options
@@ -120,109 +104,107 @@ def export(
     ...     export(clip, grids, "voxel", count=2).items
     1
     """
-    _check_kind(to, options)
+    check_kind(to, options)
     paths = [events] if isinstance(events, (str, Path)) else list(events)
     if len(paths) > 1 and options["side"] not in (None, "none"):
         raise UsageError("--side: is of one recording, and there are several: export one by one")
-    how = {**chosen(EventInput, options), "overwrite": options["overwrite"], "doubt": doubt}
-    how["side"] = options["side"]
+    reading = {**chosen(EventInput, options), "targets": targets}
+    how = chosen_options(to, options)
+    described = {"to": to, **how}
+    how |= {"threads": options["threads"]}
     if to == "e2vid":
-        return export_e2vid(paths, output, options["valid"], options["threads"], **how)
-    window_us = options["window_us"]
-    if to == "ev-segnet":
-        drawn = ev_segnet.SegmentationSettings(
-            options["split"], options["rows"], options["counts"] == "scaled"
-        )
-        return export_ev_segnet(paths, output, window_us or 50_000, drawn, **how)
-    names = ("bins", "normalise", "polarity", "span")
-    settings = voxels.VoxelSettings(**{name: options[name] for name in names})
-    cutting = Cutting(window_us, options["count"], options["at"] == "images")
-    most_empty = options["most_empty"]
-    return export_voxels(paths, output, cutting, settings, most_empty=most_empty, **how)
+        what, write = "sequences", _e2vid(Path(output), how)
+    elif to == "ev-segnet":
+        what, write = "pictures of events", _ev_segnet(how)
+    else:
+        what, write = LAYOUTS[to].what, _units(LAYOUTS[to], how, is_tree([*map(Path, paths)]))
+    overwrite = options["overwrite"]
+    return _exported(
+        paths,
+        output,
+        described,
+        what,
+        write,
+        overwrite=overwrite,
+        doubt=doubt,
+        side=options["side"],
+        **reading,
+    )
 
 
-def _check_kind(to: str, options: Mapping[str, Any]) -> None:
-    """Raise UsageError where options are missing, or do not fit what is made."""
-    if to not in EXPORTS:
-        raise UsageError(f"--to: must be one of {', '.join(EXPORTS)}, got {to!r}")
-    for name, option in declared(*EXPORTS.values()).items():
-        if name not in declared(EXPORTS[to]) and options[name] != option.default:
-            raise UsageError(f"{option.flag_of(name)} is not for --to {to}: leave it out")
-    cuts = [options[name] is not None for name in ("window_us", "count", "at")]
-    if to == "voxel" and sum(cuts) != 1:
-        raise UsageError("--to voxel needs one of --window TIME, --count N and --at images")
-
-
-def export_voxels(
-    paths: Many[str | Path],
-    output: str | Path,
-    cutting: Cutting,
-    settings: voxels.VoxelSettings | None = None,
+@takes(ExportOptions, *EXPORTS.values())
+def export_unit(
+    events: Path,
+    output: Path,
+    to: str,
     *,
-    most_empty: int = MOST_EMPTY,
-    **how: Any,
-) -> Exported:
-    """Write the voxel grids of all windows; `how` as in :func:`_exported`.
+    doubt: Callable[[str], None] = lambda text: None,
+    **options: Any,
+) -> int:
+    """Make what a set of :data:`LAYOUTS` holds of one recording; return the number of items.
 
-    `most_empty` windows of time in a row may have no event.
-
-    Raises
-    ------
-    Adv2eError
-        For anything wrong with an input or the output; then nothing is left.
-    """
-    settings = settings or voxels.VoxelSettings()
-
-    def one(sequence: Sequence, folder: Path) -> tuple[tuple[int, int], int]:
-        size, slices = _slices(sequence, cutting, most_empty)
-        return size, voxels.write_voxels(slices, size, folder / sequence.name, settings)
-
-    described = {"to": "voxel", "cutting": asdict(cutting), **asdict(settings)}
-    return _exported(paths, output, described, "voxel grids", _each(one), **how)
-
-
-def export_ev_segnet(
-    paths: Many[str | Path],
-    output: str | Path,
-    window_us: int = 50_000,
-    settings: ev_segnet.SegmentationSettings | None = None,
-    **how: Any,
-) -> Exported:
-    """Write a picture of the events before each image; `how` as in :func:`_exported`.
+    What is there is replaced.
 
     Raises
     ------
     Adv2eError
         For anything wrong with an input or the output; then nothing is left.
     """
-    settings = settings or ev_segnet.SegmentationSettings()
-
-    def one(sequence: Sequence, folder: Path) -> tuple[tuple[int, int], int]:
-        size, _, parts = events_in_order(sequence.file)
-        slices = before_images(parts, sequence.image_times_us, window_us)
-        images = (image for _, image in e2vid.images_of(sequence))
-        number = ev_segnet.write_event_images(sequence.name, slices, images, size, folder, settings)
-        return size, number
-
-    described = {"to": "ev-segnet", "window_us": window_us, **asdict(settings)}
-    return _exported(paths, output, described, "pictures of events", _each(one), **how)
+    how = {**chosen_options(to, options), "threads": options["threads"]}
+    (sequence,) = open_sequences([events], **chosen(EventInput, options))
+    with Staging(True, sequence.file.inputs) as staging, writing(output):
+        made = staging.file(output) if output.suffix else staging.folder(output, lambda path: None)
+        staging.prepare()
+        _, items = LAYOUTS[to].write(sequence, made, how, doubt)
+    for problem in dict.fromkeys(sequence.file.facts.problems):
+        doubt(f"{events}: {problem}")
+    return items
 
 
-def export_e2vid(
-    paths: Many[str | Path],
-    output: str | Path,
-    valid_share: float = 0.2,
-    threads: int | None = None,
-    **how: Any,
-) -> Exported:
-    """Write a training set for E2VID; `how` as in :func:`_exported`.
+def _units(layout: Layout, how: Mapping[str, Any], of_tree: bool) -> Write:
+    """Return a writer of recordings, each to its place; with lists, of a tree or of a set."""
 
-    Raises
-    ------
-    Adv2eError
-        For anything wrong with an input or the output; then nothing is left.
-    """
+    def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
+        rows = []
+        for sequence in sequences:
+            place, label, split = layout.place_of(sequence.name, how["valid"])
+            rows.append((str(place), label, split))
+        if twice := [row for row, number in Counter(rows).items() if number > 1]:
+            raise UsageError(f"two recordings would both be {twice[0][0]}: rename one")
+        for sequence, (where, *_) in zip(sequences, rows, strict=True):
+            size, items = layout.write(sequence, folder / where, how, told["doubts"].append)
+            told["sequences"].append({"name": sequence.name, "size": list(size), "items": items})
+        if of_tree or layout.place != "{name}":
+            write_list(folder / FILES, rows)
+        return sum(entry["items"] for entry in told["sequences"])
 
+    return write
+
+
+def write_list(path: Path, rows: Iterable[tuple[str, str, str]]) -> None:
+    """Write a list of files or folders, their classes, and parts of the set that they are in."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        lines = csv.writer(file, lineterminator="\n")
+        lines.writerow(("file", "class", "split"))
+        lines.writerows(sorted(rows))
+
+
+def _ev_segnet(how: Mapping[str, Any]) -> Write:
+    drawn = ev_segnet.SegmentationSettings(how["split"], how["rows"], how["counts"] == "scaled")
+
+    def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
+        for sequence in sequences:
+            size, _, parts = events_in_order(sequence.file)
+            slices = before_images(parts, sequence.image_times_us, how["window_us"])
+            images = (image for _, image in e2vid.images_of(sequence))
+            items = ev_segnet.write_event_images(sequence.flat, slices, images, size, folder, drawn)
+            told["sequences"].append({"name": sequence.name, "size": list(size), "items": items})
+        return sum(entry["items"] for entry in told["sequences"])
+
+    return write
+
+
+def _e2vid(output: Path, how: Mapping[str, Any]) -> Write:
     def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
         for sequence in sequences:
             number = len(sequence.image_times_us)
@@ -232,29 +214,16 @@ def export_e2vid(
                     f" event_cnn_minimal has it, needs {e2vid.USUAL_FRAMES}"
                 )
         train, valid = e2vid.write_training_set(
-            sequences, folder, Path(output), valid_share, threads
+            sequences, folder, output, how, told["doubts"].append
         )
         told.update(train=train, valid=valid)
         return len(train) + len(valid)
 
-    described = {"to": "e2vid", "valid_share": valid_share}
-    return _exported(paths, output, described, "sequences", write, **how)
+    return write
 
 
 Write = Callable[[list[Sequence], Path, dict[str, Any]], int]
 """Is given the recordings, the folder, and what is told of them; returns how many items."""
-
-
-def _each(one: Callable[[Sequence, Path], tuple[tuple[int, int], int]]) -> Write:
-    """Return a writer of recordings one by one; `one` returns sensor size and number of items."""
-
-    def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
-        for sequence in sequences:
-            size, items = one(sequence, folder)
-            told["sequences"].append({"name": sequence.name, "size": list(size), "items": items})
-        return sum(entry["items"] for entry in told["sequences"])
-
-    return write
 
 
 def _exported(
@@ -297,7 +266,7 @@ def _exported(
     told: dict[str, Any] = {"sequences": [], "doubts": []}
     read = [one for sequence in sequences for one in sequence.file.inputs]
     with Staging(overwrite, read) as staging, writing(output):
-        folder = staging.folder(Path(output), _foreign)
+        folder = staging.folder(Path(output), foreign)
         staging.prepare()
         folder.mkdir()
         items = write(sequences, folder, told)
@@ -333,21 +302,7 @@ def _write_side(
         write_side(folder, side.files(partial(clock_of, sequence.file), tell))
 
 
-def _slices(
-    sequence: Sequence, cutting: Cutting, most_empty: int
-) -> tuple[tuple[int, int], Iterator[Slice]]:
-    """Return the size of the sensor and the windows of a recording."""
-    size, first_us, parts = events_in_order(sequence.file)
-    if cutting.at_images:
-        return size, between_images(parts, sequence.image_times_us)
-    if cutting.count is not None:
-        return size, by_count(parts, cutting.count)
-    assert cutting.window_us is not None
-    label = str(sequence.file.facts.path)
-    return size, by_time(parts, first_us, cutting.window_us, label, most_empty)
-
-
-def _foreign(folder: Path) -> str | None:
+def foreign(folder: Path) -> str | None:
     """Name something in `folder` that no export of ours has put there."""
     try:
         ours = json.loads((folder / DESCRIPTION).read_text("utf-8"))["entries"]

@@ -1,7 +1,10 @@
-"""Windows of events, and voxel grids of them in the files that E2VID and its relatives train on.
+"""Windows of events, and what is made of each, in the files that E2VID and its relatives train on.
 
 ================================ ==================================================================
-NAME/event_tensor_%010d.npy      float32, (bins, rows, columns); (2 bins, ...) with split polarities
+NAME/event_tensor_%010d.npy      voxel: float32, (bins, rows, columns); split: (2 bins, ...)
+NAME/histogram_%010d.npy         histogram: uint8, (2 bins, rows, columns), OFF first
+NAME/time_surface_%010d.npy      surface: float32, (2, rows, columns), OFF and ON
+NAME/%010d.png                   picture: colours, (rows, columns, 3)
 NAME/timestamps.txt              a line for each: its number and its time, the end of the window [s]
 NAME/boundary_timestamps.txt     a line for each: its number, start and end of its window [s]
 ================================ ==================================================================
@@ -15,12 +18,14 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import count, pairwise
 from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 from adv2e.events import Events, Window, cut, empty_events
@@ -75,25 +80,54 @@ class VoxelSettings:
         return NORMALISATIONS[self.normalise](make(part.events, self.bins, size, window))
 
 
-def write_voxels(
-    slices: Iterator[Slice], size: tuple[int, int], folder: Path, settings: VoxelSettings
-) -> int:
-    """Write the grids of all windows; return how many."""
-    folder.mkdir()
-    number = 0
-    with ExitStack() as stack:
-        times, bounds = (
-            stack.enter_context((folder / name).open("w", encoding="ascii", newline="\n"))
+Save = Callable[[Path, "Slice"], object]
+"""Writes what is made of a window; its path has no suffix."""
+
+
+class WindowFiles:
+    """What is made of windows, in a folder, and their times.
+
+    Attributes
+    ----------
+    count : int
+        Windows until now.
+    """
+
+    def __init__(self, folder: Path, stem: str, save: Save) -> None:
+        self._folder, self._stem, self._save = folder, stem, save
+        self.count = 0
+
+    def __enter__(self) -> WindowFiles:
+        self._folder.mkdir(parents=True)
+        self._files = [
+            (self._folder / name).open("w", encoding="ascii", newline="\n")
             for name in ("timestamps.txt", "boundary_timestamps.txt")
-        )
-        for part in slices:
-            grid = settings.grid(part, size).astype(np.float32)
-            np.save(folder / f"event_tensor_{number:010d}.npy", grid, allow_pickle=False)
-            start, stop = (f"{t / 1e6:.6f}" for t in (part.start_us, part.stop_us))
-            times.write(f"{number} {stop}\n")
-            bounds.write(f"{number} {start} {stop}\n")
-            number += 1
-    return number
+        ]
+        return self
+
+    def add(self, part: Slice) -> None:
+        """Write what is made of a window."""
+        self._save(self._folder / f"{self._stem}{self.count:010d}", part)
+        start, stop = (f"{t / 1e6:.6f}" for t in (part.start_us, part.stop_us))
+        for file, times in zip(self._files, (stop, f"{start} {stop}"), strict=True):
+            file.write(f"{self.count} {times}\n")
+        self.count += 1
+
+    def __exit__(self, *_: object) -> None:
+        for file in self._files:
+            file.close()
+
+
+def saved(path: Path, array: NDArray[Any]) -> None:
+    """Write an array, with the suffix that it has."""
+    np.save(path.with_name(f"{path.name}.npy"), array, allow_pickle=False)
+
+
+def save_picture(path: Path, picture: NDArray[Any]) -> None:
+    """Write a PNG, its colours in the order of OpenCV."""
+    done, data = cv2.imencode(".png", picture)
+    assert done
+    path.write_bytes(data.tobytes())
 
 
 # ---- Streams of events, cut into the windows of which networks are given a picture each.
@@ -134,15 +168,22 @@ def by_time(
     """
     windows = ((start, start + length_us) for start in count(first_us, length_us))
     empty = 0
-    for one in _between(parts, windows, to_the_end=False):
-        empty = 0 if one.events.size else empty + 1
-        if empty > most_empty:
-            raise DataError(
-                f"{label}: no event in over {most_empty:,} windows of {length_us / 1000:g} ms, to"
-                f" {one.stop_us * 1e-6:.3f} s: 'adv2e info' tells gaps that a wrong time makes; a"
-                " longer --window makes fewer, --max-empty N allows N"
-            )
+    for one in in_windows(parts, windows, to_the_end=False):
+        empty = check_empty(one, empty, label, most_empty)
         yield one
+
+
+def check_empty(one: Slice, empty: int, label: str, most: int) -> int:
+    """Return how many windows in a row have no event; DataError if they are more than `most`."""
+    empty = 0 if one.events.size else empty + 1
+    if empty > most:
+        raise DataError(
+            f"{label}: no event in over {most:,} windows of"
+            f" {(one.stop_us - one.start_us) / 1000:g} ms, to {one.stop_us * 1e-6:.3f} s:"
+            " 'adv2e info' tells gaps that a wrong time makes; a longer --window makes fewer,"
+            " --max-empty N allows N"
+        )
+    return empty
 
 
 def by_count(parts: Iterable[Events], number: int) -> Iterator[Slice]:
@@ -155,14 +196,14 @@ def by_count(parts: Iterable[Events], number: int) -> Iterator[Slice]:
             yield Slice(int(taken["t"][0]), int(taken["t"][-1]), taken)
 
 
-def between_images(parts: Iterable[Events], times_us: list[int]) -> Iterator[Slice]:
+def between_images(parts: Iterable[Events], times_us: Iterable[int]) -> Iterator[Slice]:
     """Yield the windows from each image to the next, [image, next image)."""
-    return _between(parts, pairwise(times_us), to_the_end=True)
+    return in_windows(parts, pairwise(times_us), to_the_end=True)
 
 
 def before_images(parts: Iterable[Events], times_us: list[int], length_us: int) -> Iterator[Slice]:
     """Yield the windows before each image, [image - length, image)."""
-    return _between(parts, ((t - length_us, t) for t in times_us), to_the_end=True)
+    return in_windows(parts, ((t - length_us, t) for t in times_us), to_the_end=True)
 
 
 def _joined(held: Events, part: Events) -> Events:
@@ -170,7 +211,7 @@ def _joined(held: Events, part: Events) -> Events:
     return np.concatenate([held, part]) if held.size else part
 
 
-def _between(
+def in_windows(
     parts: Iterable[Events], windows: Iterable[Window], *, to_the_end: bool
 ) -> Iterator[Slice]:
     """Yield the events of windows whose starts never decrease.

@@ -961,3 +961,19 @@ def open_nmnist(path: Path, facts: Facts) -> EventFile:
         facts.state((_SIDE, _SIDE), "N-MNIST")
     facts.stated_unit = "us"
     return EventFile("nmnist", facts, parts)
+
+
+class NmnistWriter(Writer):
+    """Writes a file of N-MNIST; see :class:`Writer`."""
+
+    def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
+        self._file = stack.enter_context(path.open("wb"))
+
+    def write_events(self, events: Events) -> None:
+        """Append events."""
+        data = np.empty((events.size, 5), np.uint8)
+        t = events["t"]
+        columns = events["x"], events["y"], events["p"] << 7 | t >> 16, t >> 8 & 0xFF, t & 0xFF
+        for number, column in enumerate(columns):
+            data[:, number] = column
+        self._file.write(data.data)

@@ -7,7 +7,6 @@ import pytest
 from trees_of_batch import clip, last_of, lines_of, made_in
 
 from adv2e.exporting import export
-from adv2e.exporting.voxels import VoxelSettings
 
 
 @pytest.fixture
@@ -23,28 +22,26 @@ def below(dest, folder):
 
 
 @pytest.mark.parametrize(
-    ("words", "make"),
+    ("words", "how"),
     [
         (
             ("voxel", "--window", "20ms", "--bins", 3),
-            lambda events, to: export.export_voxels(
-                [events], to, export.Cutting(20_000), VoxelSettings(bins=3)
-            ),
+            {"window_us": 20_000, "bins": 3},
         ),
         (
             ("voxel",),
-            lambda events, to: export.export_voxels([events], to, export.Cutting(at_images=True)),
+            {"at": "images"},
         ),
-        (("ev-segnet",), lambda events, to: export.export_ev_segnet([events], to)),
+        (("ev-segnet",), {}),
         (
             ("ev-segnet", "--window", "10ms"),
-            lambda events, to: export.export_ev_segnet([events], to, 10_000),
+            {"window_us": 10_000},
         ),
     ],
     ids=["windows", "images", "ev-segnet", "10ms"],
 )
 @pytest.mark.quick_cases(1)
-def test_an_export_is_what_the_command_of_its_own_makes(batch, source, tmp_path, words, make):
+def test_an_export_is_what_the_command_of_its_own_makes(batch, source, tmp_path, words, how):
     dest = tmp_path / "to"
     done = batch(source, dest, "--export", *words)
     assert done.status == 0, done.err
@@ -52,7 +49,7 @@ def test_an_export_is_what_the_command_of_its_own_makes(batch, source, tmp_path,
         folder = f"{name}.{words[0]}"
         alone = tmp_path / "alone" / folder
         alone.parent.mkdir(parents=True, exist_ok=True)
-        made = make(dest / f"{name}.h5", alone)
+        made = export.export(dest / f"{name}.h5", alone, words[0], **how)
         assert below(dest, folder) == below(tmp_path / "alone", folder) != {}
         assert last_of(dest)[name]["export"]["items"] == made.items > 0
     assert not list(dest.rglob(".*"))
@@ -108,7 +105,7 @@ def test_an_export_that_fails_is_told_and_the_events_are_kept(batch, source, tmp
         raise OSError(28, "No space left on device", "b.voxel")
 
     with monkeypatch.context() as patch:
-        patch.setattr(export, "export_voxels", fails)
+        patch.setattr(export, "export", fails)
         done = batch(*call)
         assert done.status == 1
         assert "a: b.voxel: No space left on device" in done.err
@@ -128,9 +125,9 @@ def test_an_export_that_fails_is_told_and_the_events_are_kept(batch, source, tmp
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--export", "e2vid", "--window", "20ms"), "--window is for --export voxel and"),
-        (("--window", "20ms"), "--window is for --export voxel and"),
-        (("--export", "ev-segnet", "--bins", 3), "--bins is for --export voxel"),
+        (("--export", "e2vid", "--window", "20ms"), "--window is for --export voxel, "),
+        (("--window", "20ms"), "--window is for --export voxel, "),
+        (("--export", "ev-segnet", "--bins", 3), "--bins is for --export voxel, "),
         (("--export", "voxel", "--format", "txt"), "--export voxel needs frames, and"),
         (("--export", "voxels"), "'voxels' is not one of"),
     ],
@@ -173,3 +170,72 @@ def test_files_beside_those_of_events_are_compared_too(batch, source, tmp_path):
     assert "2 a file beside its own changed" in batch(*call).err
     assert made_in(dest) == whole
     assert last_of(dest)["a"]["beside"].keys() == {"a.txt.causes.txt", "a.txt.json"}
+
+
+def arrays_below(folder):
+    return {path.name: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("voxel", "--window", "7ms", "--bins", "3"), ("voxel",), ("surface",), ("histogram",)],
+    ids=" ".join,
+)
+def test_without_events_the_windows_are_the_same(batch, source, tmp_path, words):
+    kept, alone = tmp_path / "kept", tmp_path / "alone"
+    assert batch(source, kept, "--export", *words).status == 0
+    call = (source, alone, "--export", *words, "--no-events")
+    done = batch(*call)
+    assert done.status == 0, done.err
+    for name in ("a", "deep/b"):
+        made = arrays_below(alone / f"{name}.{words[0]}" / name[-1])
+        assert made == arrays_below(kept / f"{name}.{words[0]}" / name[-1])
+        assert len(made) > 3
+    assert not list(alone.rglob("*.h5"))
+    assert not list(alone.rglob(".*"))
+    told = json.loads((alone / f"a.{words[0]}" / "export.json").read_text())
+    assert told["simulated"]["seed"] == last_of(alone)["a"]["seed"]
+    # called again, all is kept; what is changed is made anew
+    assert "2 kept" in batch(*call).err
+    before = made_in(alone)
+    next((alone / f"a.{words[0]}").rglob("*0.npy")).write_bytes(b"spoiled")
+    assert "1 its file changed, 1 kept" in batch(*call).err
+    assert made_in(alone) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "--no-events is for --export voxel, histogram, surface and picture"),
+        (("--export", "e2vid"), "--no-events is for --export voxel, histogram"),
+        (("--export", "voxel", "--causes"), "--no-events keeps no --causes and --with-frames"),
+    ],
+)
+def test_no_events_needs_something_else_to_keep(batch, source, tmp_path, words, said):
+    done = batch(source, tmp_path / "to", "--no-events", *words)
+    assert (done.status, said in done.err) == (2, True), done.err
+
+
+def test_a_set_lies_in_one_folder(batch, source, tmp_path):
+    dest, alone = tmp_path / "to", tmp_path / "alone"
+    clip(source / "cat" / "c.avi", count=4)
+    (source / "a.avi").unlink()
+    call = (source, dest, "--export", "nmnist")
+    assert batch(*call).status == 0
+    made = sorted(str(path.relative_to(dest)) for path in (dest / "nmnist").rglob("*.*"))
+    assert made[-1] == "nmnist/files.csv"
+    export.export(dest, alone, "nmnist")
+    for path in (dest / "nmnist").rglob("*.*"):
+        assert path.read_bytes() == (alone / path.relative_to(dest / "nmnist")).read_bytes()
+    assert "2 kept" in batch(*call).err
+    (dest / made[0]).write_bytes(b"")
+    assert "1 its export changed, 1 kept" in batch(*call).err
+    clip(source / "loose.avi", count=4)
+    assert "loose: is in no folder named after its class" in batch(*call).err
+
+
+def test_sets_for_reconstruction_hold_the_frames(batch, source, tmp_path):
+    dest = tmp_path / "to"
+    assert batch(source, dest, "--export", "evreal").status == 0
+    assert np.load(dest / "evreal" / "deep_b" / "images.npy").shape == (4, 24, 32, 1)
+    assert not list(dest.rglob(".*"))

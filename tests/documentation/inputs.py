@@ -39,6 +39,13 @@ def videos(path: Path) -> None:
         video(path / name)
 
 
+def stills(path: Path) -> None:
+    """Make folders of pictures, one for each class."""
+    for number, name in enumerate(("cat/a", "cat/b", "dog/a", "dog/b")):
+        (path / name).parent.mkdir(parents=True, exist_ok=True)
+        cv2.imwrite(str(path / f"{name}.png"), picture(number))
+
+
 def images(path: Path) -> None:
     """Make a folder of images."""
     path.mkdir()
@@ -134,6 +141,7 @@ INPUTS: dict[str, Callable[[Path], None]] = {
     "clip.mp4": video,
     "phone.mp4": video,
     "videos/": videos,
+    "stills/": stills,
     "frames/": images,
     "sequence/": listed_images,
     "photo.png": photo,
