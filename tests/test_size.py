@@ -18,18 +18,18 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1490,
-    "batches": 1350,
-    "cli": 1230,
+    "": 1550,
+    "batches": 1380,
+    "cli": 1235,
     "comparison": 1165,
     "compilation": 285,
     "config": 1315,
     "conversion": 1195,
     "diagnosis": 8320,
     "effects": 1615,
-    "exporting": 480,
+    "exporting": 1075,
     "files": 785,
-    "formats": 5100,
+    "formats": 5110,
     "inspection": 260,
     "kernel": 5940,
     "light": 890,
@@ -38,14 +38,14 @@ LIMITS = {
     "process": 265,
     "rendering": 740,
     "reports": 1791,
-    "representations": 112,
+    "representations": 140,
     "side": 840,
     "sources": 3680,
     "synthetic": 160,
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 332
+FILES = 338
 """Most modules of all packages together."""
 
 _SLACK = 60

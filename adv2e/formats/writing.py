@@ -445,7 +445,7 @@ def write_side(folder: Path, files: SideFiles) -> list[str]:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(data)
         names.add(name.partition("/")[0])
-    folder.mkdir(exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     return sorted(names)
 
 
