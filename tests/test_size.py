@@ -39,7 +39,7 @@ LIMITS = {
     "rendering": 740,
     "reports": 1791,
     "representations": 140,
-    "side": 840,
+    "side": 845,
     "sources": 3680,
     "synthetic": 160,
 }

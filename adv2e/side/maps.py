@@ -77,13 +77,18 @@ class Maps:
 
     def map_of(self, name: str, place: Placement) -> NDArray[Any]:
         """Return a map of the frame; DataError if it is none, or of another size."""
-        found = decoded(self.read(name), f"{self.label}/{PurePosixPath(name).name}", self.kind)
-        place.check(Size(found.shape[1], found.shape[0]), f"{self.label}/{name}")
-        return found
+        return self._map_in(self.read(name), name, place)
 
     def placed(self, name: str, place: Placement) -> NDArray[Any]:
         """Return a map on the sensor; DataError as :meth:`map_of`."""
-        found = self.map_of(name, place)
+        return self._on_sensor(self.map_of(name, place), place)
+
+    def _map_in(self, data: bytes, name: str, place: Placement) -> NDArray[Any]:
+        found = decoded(data, f"{self.label}/{PurePosixPath(name).name}", self.kind)
+        place.check(Size(found.shape[1], found.shape[0]), f"{self.label}/{name}")
+        return found
+
+    def _on_sensor(self, found: NDArray[Any], place: Placement) -> NDArray[Any]:
         if self.kind != "flow":
             return place.taken(found)
         steps = np.array(place.scale, np.float32) * (-1 if place.turned else 1)
@@ -125,14 +130,15 @@ class Maps:
             times, wanted = clock.of(self.times)
         for number in np.flatnonzero(wanted.all(axis=1)).tolist():
             try:
-                made = self.placed(self.names[number], place)
+                data = self.read(self.names[number])
+                made = self._on_sensor(self._map_in(data, self.names[number], place), place)
             except DataError as error:
                 wrong.append(str(error))
                 continue
             suffix = PurePosixPath(self.names[number]).suffix.lower()
             suffix = ".npy" if self.kind == "flow" else suffix
             name = f"{self.kind}/{len(lines):08d}{suffix}"
-            palette = _palette(self.read(self.names[number])) if self.kind == "masks" else b""
+            palette = _palette(data) if self.kind == "masks" else b""
             yield name, _encoded(made, suffix, palette)
             lines.append(" ".join([*map(nine_decimals, times[number]), name]) + "\n")
         yield f"{self.kind}.txt", "".join(lines).encode()

@@ -42,19 +42,18 @@ from writing import output_option, table, write_report
 
 from adv2e import load_config, read_events
 from adv2e.background import default_threads
-from adv2e.comparison.features import trains
 from adv2e.config.model import Sensor
 from adv2e.diagnosis.configurations import of_known_light
 from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.film.diagnose import halves_of
 from adv2e.diagnosis.film.fitting import FilmFitter
-from adv2e.diagnosis.film.nearness import DISTANCES, distances
+from adv2e.diagnosis.film.nearness import DISTANCES, distances, gaps
 from adv2e.diagnosis.film.recordings import FilmRecordings, Pair, read_recordings, split
 from adv2e.diagnosis.film.registration import first_view
 from adv2e.diagnosis.film.selection import FilmSearch
 from adv2e.diagnosis.film.view import Films, View
 from adv2e.diagnosis.fitting.fitter import TOLERANCE, threshold_nuisance
-from adv2e.events import Events
+from adv2e.events import Events, by_time
 from adv2e.geometry import Size, parse_size
 
 _PICTURED, _LARGER = 3, 6
@@ -183,12 +182,8 @@ def without_pictures(
         for one, at in zip(moved, own, strict=True):
             one["t"][at] = np.rint(about + (one["t"][at] - about) * stretch + shift)
 
-    def gaps(recordings: Recordings) -> NDArray[np.float64]:
-        edges = 10.0 ** np.arange(0.0, 6.01, 0.25)
-        found = [
-            trains(one[np.argsort(one["t"], kind="stable")], size.width)[1] for one in recordings
-        ]
-        counts = np.histogram(np.maximum(np.concatenate(found), 1), edges)[0]
+    def shares(recordings: Recordings) -> NDArray[np.float64]:
+        counts = np.sum([gaps(by_time(one), size) for one in recordings], axis=0)
         return np.asarray(counts / max(counts.sum(), 1))
 
     number, made = (np.array([len(one) for one in side], float) for side in (measured, simulated))
@@ -199,7 +194,7 @@ def without_pictures(
         "share of ON, simulated": float(np.concatenate([one["p"] for one in simulated]).mean()),
         "the same, measured ": float(np.concatenate([one["p"] for one in measured]).mean()),
         "course": float(np.abs(course(moved, span) - wanted).sum()),
-        "gaps": float(np.abs(gaps(moved) - gaps(measured)).sum()),
+        "gaps": float(np.abs(shares(moved) - shares(measured)).sum()),
     }
 
 

@@ -28,6 +28,11 @@ DISTANCES = (TOTALS, SPREAD, CORRELATION, COURSE, GAPS, MAPS, TOLD)
 """Names of the distances that :func:`distances` returns: the less, the nearer."""
 
 
+def gaps(events: Events, size: Size) -> Array:
+    """Return the numbers of times between events of a pixel, by quarters of decades of us."""
+    return np.histogram(np.maximum(trains(events, size.width)[1], 1), _GAPS_US)[0].astype(float)
+
+
 def distances(
     measured: Sequence[Events], simulated: Sequence[Events], size: Size, span: Window
 ) -> dict[str, float]:
@@ -40,8 +45,8 @@ def distances(
     def course(events: Events) -> Array:
         return np.histogram(events["t"], np.linspace(*span, _BINS + 1))[0].astype(np.float64)
 
-    def gaps(events: Events) -> Array:
-        return np.histogram(np.maximum(trains(events, size.width)[1], 1), _GAPS_US)[0].astype(float)
+    def between(events: Events) -> Array:
+        return gaps(events, size)
 
     def maps(events: Events) -> Array:
         place = events["y"].astype(np.intp) * size.width + events["x"]
@@ -56,7 +61,7 @@ def distances(
     scale = np.sqrt((apart**2).sum(axis=1).prod())
     # numbers that are all alike do not go together, nor against one another
     found += [1.0 - float(apart[0] @ apart[1] / scale) if scale else 1.0]
-    found += [np.abs(np.subtract(*shares(of))).sum() for of in (course, gaps)]
+    found += [np.abs(np.subtract(*shares(of))).sum() for of in (course, between)]
     found += [1.0 - np.mean(alike), accuracy(samples(measured, simulated, size, span))]
     return dict(zip(DISTANCES, map(float, found), strict=True))
 

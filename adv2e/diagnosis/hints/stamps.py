@@ -68,13 +68,16 @@ def double_reads(stream: Stream) -> DoubleRead | None:
         return None
     sums = (stream.on + stream.on_before)[twice]
     off, mixed, on = np.bincount(sums, minlength=3).tolist()
-    polarity = "on" if mixed > off else "same"
-    of_off = mixed if polarity == "on" else off
     ons = np.count_nonzero(stream.on)
-    # the second readings are no events of their own
-    once = max(ons - on - (of_off if polarity == "on" else 0), 1), max(len(stream) - ons - off, 1)
-    shares = (float(f"{n / of:.3g}") for n, of in zip((on, of_off), once, strict=True))
-    return DoubleRead(**dict(zip(("on", "off"), shares, strict=True)), polarity=polarity)
+    offs = len(stream) - ons - off  # the second readings are no events of their own
+    if mixed > off:
+        return DoubleRead(on=_share(on, ons - on - mixed), off=_share(mixed, offs), polarity="on")
+    return DoubleRead(on=_share(on, ons - on), off=_share(off, offs))
+
+
+def _share(part: int, whole: int) -> float:
+    """Return a share, in three digits."""
+    return float(f"{part / max(whole, 1):.3g}")
 
 
 def service_times(stream: Stream) -> Service | None:
