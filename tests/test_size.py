@@ -18,8 +18,8 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1520,
-    "batches": 1420,
+    "": 1530,
+    "batches": 1565,
     "cli": 1300,
     "comparison": 1165,
     "compilation": 285,
@@ -44,7 +44,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 330
+FILES = 331
 """Most modules of all packages together."""
 
 _SLACK = 60
