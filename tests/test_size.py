@@ -18,7 +18,7 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1530,
+    "": 1640,
     "batches": 1565,
     "cli": 1300,
     "comparison": 1165,
@@ -27,7 +27,7 @@ LIMITS = {
     "conversion": 1195,
     "diagnosis": 8230,
     "effects": 1548,
-    "exporting": 1045,
+    "exporting": 1050,
     "files": 780,
     "formats": 5070,
     "inspection": 260,
@@ -44,7 +44,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 331
+FILES = 332
 """Most modules of all packages together."""
 
 _SLACK = 60

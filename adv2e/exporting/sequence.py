@@ -128,6 +128,18 @@ def open_sequences(
     UsageError, DataError
         Two have one name, there is no recording in a tree, or one cannot be read.
     """
+    found = named_paths(paths)
+    if targets is not None and len(targets) != len(found):
+        raise UsageError(f"targets: {len(targets)} for {len(found)} recordings")
+    each: Many[Targets | None] = targets or [None] * len(found)
+    return [
+        Sequence(name, open_events(path, **reading), given)
+        for (name, path), given in zip(found, each, strict=True)
+    ]
+
+
+def named_paths(paths: Many[str | Path]) -> list[tuple[str, Path]]:
+    """Return names and paths of recordings; parameters and errors as :func:`open_sequences`."""
     found = [Path(path) for path in paths]
     if is_tree(found):
         (root,) = found
@@ -138,13 +150,7 @@ def open_sequences(
     else:
         names = _names(found)
     _check_once(names)
-    if targets is not None and len(targets) != len(found):
-        raise UsageError(f"targets: {len(targets)} for {len(found)} recordings")
-    each: Many[Targets | None] = targets or [None] * len(found)
-    return [
-        Sequence(name, open_events(path, **reading), given)
-        for name, path, given in zip(names, found, each, strict=True)
-    ]
+    return list(zip(names, found, strict=True))
 
 
 def is_tree(paths: Many[Path]) -> bool:
