@@ -8,7 +8,7 @@ versions     of packages, which files name
 config, seed the configuration, with distributions as such, and the seed of the batch
 options      of :class:`adv2e.options.BatchOptions`, those that were given
 settings     SHA-256 of all of these and of effects and networks of the user's own
-sequences    by name: SHA-256 of ``source``, ``output``, and ``export``, if there is one
+sequences    by name: SHA-256 of ``source``, ``output``, files beside it, and ``export``
 ============ ====================================================================================
 """
 
@@ -24,7 +24,6 @@ from typing import Any
 from adv2e import __version__
 from adv2e.batches.plan import Wanted
 from adv2e.batches.sequences import Sequence as Found
-from adv2e.conversion.pipeline import versions
 from adv2e.errors import DataError, UsageError
 from adv2e.files.regular import read_text_bytes, shown
 from adv2e.files.staging import Staging, writing
@@ -62,10 +61,8 @@ class Recipe:
         except (ValueError, TypeError, RecursionError):
             raise DataError(f"{path}: is no recipe of a batch") from None
         if recipe.adv2e != __version__:
-            raise DataError(
-                f"{path}: made by adv2e {recipe.adv2e}, and no other makes the same files: this is"
-                f" {__version__}"
-            )
+            made = f"made by adv2e {recipe.adv2e}, and no other makes the same files"
+            raise DataError(f"{path}: {made}: this is {__version__}")
         return recipe
 
     def asked(self, path: Path, given: Mapping[str, Any], others: bool) -> dict[str, Any]:
@@ -84,24 +81,22 @@ class Recipe:
         }
         return {**given, **told, "recipe": None}
 
-    def chosen(self, sequences: Sequence[Found], label: str) -> list[Found]:
+    def chosen(self, sequences: Sequence[Found]) -> list[Found]:
         """Return the sequences of the recipe; DataError if one is missing or another one."""
         found = {one.name: one for one in sequences}
         if missing := [name for name in self.sequences if name not in found]:
-            raise DataError(
-                f"{shown(missing[0])}: is not there, and {label} needs it"
-                + (f", and {len(missing) - 1:,} more" if len(missing) > 1 else "")
-            )
+            more = f", and {len(missing) - 1:,} more" if len(missing) > 1 else ""
+            raise DataError(f"{shown(missing[0])}: is not there, and the recipe needs it{more}")
         for name, told in self.sequences.items():
             if digest_of(found[name].source) != told.get("source"):
-                raise DataError(f"{found[name].source}: is not the source that {label} names")
+                raise DataError(f"{found[name].source}: is not the source that the recipe names")
         return [one for one in sequences if one.name in self.sequences]
 
     def complaint(self, record: Mapping[str, Any], wanted: Wanted) -> str:
         """Return how what was made of a sequence differs from the recipe, or ""."""
         made, told = _digests(record, wanted), self.sequences[record["name"]]
         if wrong := [name for name in told if made.get(name) != told[name]]:
-            here = versions(_PACKAGES)
+            here = _versions()
             apart = [
                 f"{k} {v}, here {here.get(k)}" for k, v in self.versions.items() if here.get(k) != v
             ]
@@ -110,12 +105,16 @@ class Recipe:
         return ""
 
 
-_PACKAGES = ("av", "hdf5plugin", "deflate", "h5py")
+def _versions() -> dict[str, Any]:
+    from adv2e.conversion.pipeline import versions  # noqa: PLC0415 - numba takes its time
+
+    return versions(("av", "deflate", "h5py"))
 
 
 def _digests(record: Mapping[str, Any], wanted: Wanted) -> dict[str, str]:
     """Return the digests of source and output of a sequence, and of its export."""
     found = {"source": record["source_sha256"], "output": record["sha256"]}
+    found |= record.get("beside", {})
     if wanted.export is not None and "export" in record:
         found["export"] = record["export"]["sha256"]
         if wanted.export.kind == "e2vid":  # its lists name DEST
@@ -145,9 +144,7 @@ def write_recipe(
         if is_ours(name) and record["status"] == "done" and record["settings"] == wanted.settings
         if "export_error" not in record
     }
-    recipe = Recipe(
-        *(__version__, versions(_PACKAGES), config, wanted.seed, told, wanted.settings, done)
-    )
+    recipe = Recipe(*(__version__, _versions(), config, wanted.seed, told, wanted.settings, done))
     text = json.dumps(asdict(recipe), indent=1, sort_keys=True, ensure_ascii=True) + "\n"
     with Staging(overwrite=True) as staging, writing(wanted.dest):
         place = staging.file(wanted.dest / NAME)

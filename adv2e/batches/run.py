@@ -196,7 +196,7 @@ class Batch:
         if recipe is not None:
             if recipe.settings != self._wanted.settings:
                 raise DataError("the recipe is of other effects or networks: give --effect FILE")
-            self._sequences = recipe.chosen(self._sequences, "the recipe")
+            self._sequences = recipe.chosen(self._sequences)
         self._names = {one.name for one in self._sequences}
         self._states = {one.name: state_of(one.source) for one in self._sequences}
         if shard is not None:

@@ -149,7 +149,7 @@ def named_paths(paths: Many[str | Path]) -> list[tuple[str, Path]]:
         names = [_stem(path, path.relative_to(root).as_posix()) for path in found]
     else:
         names = _names(found)
-    _check_once(names)
+    check_once(names)
     return list(zip(names, found, strict=True))
 
 
@@ -190,7 +190,8 @@ def _names(paths: list[Path]) -> list[str]:
     ]
 
 
-def _check_once(names: list[str]) -> None:
+def check_once(names: list[str]) -> None:
+    """Raise UsageError if two recordings would lie in one place."""
     twice = [name for name, number in Counter(names).items() if number > 1]
     if twice:
         raise UsageError(f"two inputs are called {twice[0]}: rename one, or export them one by one")
