@@ -916,6 +916,15 @@ class BatchOptions(AnyFrames, Part, Clock, MotionOptions, Content, Blurred, Run,
             choices=("none",),
         ),
     ]
+    recipe: Annotated[
+        "str | Path | None",
+        Option(
+            help="Make a set again by the recipe.json of its batch, and verify it.",
+            kind="path",
+            metavar="FILE",
+            completes="files",
+        ),
+    ]
     jobs: Annotated[
         "int | None",
         Option(

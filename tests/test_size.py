@@ -18,8 +18,8 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1550,
-    "batches": 1380,
+    "": 1670,
+    "batches": 1515,
     "cli": 1235,
     "comparison": 1165,
     "compilation": 285,
@@ -38,14 +38,14 @@ LIMITS = {
     "process": 265,
     "rendering": 740,
     "reports": 1791,
-    "representations": 140,
+    "representations": 145,
     "side": 845,
     "sources": 3680,
     "synthetic": 160,
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 338
+FILES = 340
 """Most modules of all packages together."""
 
 _SLACK = 60

@@ -75,9 +75,9 @@ def last_of(dest):
 
 
 def made_in(dest):
-    """Return the bytes of all files but the manifests, by their names."""
+    """Return the bytes of all files but the manifests and the recipe, by their names."""
     return {
         path.relative_to(dest).as_posix(): path.read_bytes()
         for path in sorted(dest.rglob("*"))
-        if path.is_file() and not path.name.startswith("manifest")
+        if path.is_file() and not path.name.startswith(("manifest", "recipe"))
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,13 +24,14 @@ from adv2e.batches.plan import (
     seed_of,
     shard_of,
 )
+from adv2e.batches.recipe import Recipe, write_recipe
 from adv2e.batches.sequences import Sequence as Found
 from adv2e.batches.sequences import find_sequences
 from adv2e.batches.work import Engine, Export, Job
 from adv2e.config import Family, Written, load_family, to_dict
 from adv2e.config.active_effects import user_sources
 from adv2e.config.user_effects import load_effects
-from adv2e.errors import Adv2eError, OutputError, UsageError
+from adv2e.errors import Adv2eError, DataError, OutputError, UsageError
 from adv2e.files.regular import shown
 from adv2e.files.states import digest_of_values, state_of
 from adv2e.formats.registry import check_frames, to_write
@@ -70,6 +71,8 @@ class Settings:
         Further arguments of :func:`adv2e.convert`.
     export : Export, optional
         What is made of the events.
+    given : mapping
+        Options of the batch, for its recipe.
     """
 
     config: Written | Sequence[Written] | None
@@ -79,6 +82,7 @@ class Settings:
     suffix: str
     options: Mapping[str, Any]
     export: Export | None = None
+    given: Mapping[str, Any] = field(default_factory=dict)
 
     @cached_property
     def family(self) -> Family:
@@ -128,7 +132,7 @@ class Outcome:
 
     @property
     def made(self) -> int:
-        return sum(bool(task.why) for task in self.tasks) - len(self.failed)
+        return sum(bool(one.why) and one.sequence.name not in self.failed for one in self.tasks)
 
     @property
     def kept(self) -> int:
@@ -148,6 +152,8 @@ class Batch:
         (I, N): only the I-th of N parts of about the same size.
     overwrite : bool
         Make all anew, and replace files that others made.
+    recipe : Recipe, optional
+        What is to come out.
 
     Attributes
     ----------
@@ -171,7 +177,9 @@ class Batch:
         layout: str = "auto",
         shard: tuple[int, int] | None = None,
         overwrite: bool = False,
+        recipe: Recipe | None = None,
     ) -> None:
+        self._recipe = recipe
         self.dest, self._settings, self._overwrite = dest, settings, overwrite
         self.manifest = manifest_path(dest, shard)
         self._wanted = settings.wanted(dest)
@@ -184,6 +192,11 @@ class Batch:
         )
         self._sequences, self.passed = found.sequences, found.told()
         self._passed = sum(map(len, found.passed.values()))
+        if recipe is not None:
+            if recipe.settings != self._wanted.settings:
+                raise DataError("the recipe is of other effects or networks: give --effect FILE")
+            self._sequences = recipe.chosen(self._sequences)
+        self._names = {one.name for one in self._sequences}
         self._states = {one.name: state_of(one.source) for one in self._sequences}
         if shard is not None:
             mine = shard_of(self._states, *shard)
@@ -273,7 +286,17 @@ class Batch:
                 ended(waiting[job.name], record)
             if self._wanted.export is not None:
                 self._wanted.export.write_lists(self.dest, read_records(self.dest).values())
+            self._compare(tasks, failed)
         return Outcome(tasks, failed, events, self._passed, tuple(self.passed))
+
+    def _compare(self, tasks: Sequence[Task], failed: dict[str, str]) -> None:
+        """Note what is not as the recipe says, and write that of what is there."""
+        records, settings = read_records(self.dest), self._settings
+        for name in (task.sequence.name for task in tasks if task.sequence.name not in failed):
+            if self._recipe and (wrong := self._recipe.complaint(records[name], self._wanted)):
+                failed[name] = wrong
+        names, config = self._names, settings.family.written()
+        write_recipe(self._wanted, config, settings.given, records, names.__contains__)
 
 
 @takes(BatchOptions)
@@ -366,6 +389,14 @@ def open_batch(
     **options: Unpack[BatchOptions],
 ) -> Batch:
     """Find the sequences of a batch; parameters and errors as :func:`batch`."""
+    recipe = None
+    if options["recipe"] is not None:
+        path = Path(options["recipe"])
+        recipe = Recipe.read(path)
+        others = bool(config or sets) or seed is not None
+        options = recipe.asked(path, options, others)  # type: ignore[assignment]
+        config, seed = recipe.config, recipe.seed
+    given, sets = options, tuple(sets)
     for name in (str(source), str(dest)):
         if "://" in name:
             raise UsageError(
@@ -402,11 +433,11 @@ def open_batch(
         from adv2e.exporting.layouts import chosen_options  # noqa: PLC0415 - takes its time
 
         group = EXPORTS[export.kind]
-        given = {name: one.default for name, one in declared(group).items()} | export.options()
-        asked["streamed"] = {"to": export.kind, **chosen_options(export.kind, given)}
+        how = {name: one.default for name, one in declared(group).items()} | export.options()
+        asked["streamed"] = {"to": export.kind, **chosen_options(export.kind, how)}
         asked["with_frames"], suffix, export = False, f".{export.kind}", None
     files = tuple(map(str, effects))
-    settings = Settings(config, tuple(sets), files, seed, suffix, asked, export)
+    settings = Settings(config, tuple(sets), files, seed, suffix, asked, export, given)
     shard = None if options["shard"] is None else parse_shard(options["shard"])
     return Batch(
         Path(source),
@@ -415,6 +446,7 @@ def open_batch(
         layout=options["layout"],
         shard=shard,
         overwrite=options["overwrite"],
+        recipe=recipe,
     )
 
 

@@ -23,7 +23,7 @@ _GROUPS = {
         *("export", "no_events", "window_us", "bins"),
         "as_json",
     ),
-    "Running": ("threads", "jobs", "shard", "scheduler", "dry_run", "progress", "quiet"),
+    "Running": ("threads", "recipe", "jobs", "shard", "scheduler", "dry_run", "progress", "quiet"),
 }
 """Options by what they are about, where a command has many; the others stand before or after."""
 

@@ -17,8 +17,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -34,46 +33,28 @@ DDD17_ROWS = 200
 """Rows of its pictures that are kept."""
 
 
-@dataclass(frozen=True)
-class SegmentationSettings:
-    """Settings of event images for Ev-SegNet.
-
-    Attributes
-    ----------
-    split : {'train', 'test', 'other'}
-    rows : int or None
-        Rows that are kept, from the top; None: 200 of the 260 of DDD17's camera, else all.
-    scale_counts : bool
-        See :func:`adv2e.representations.voxel_grid.event_image`.
-    """
-
-    split: str = "train"
-    rows: int | None = None
-    scale_counts: bool = True
-
-    def rows_of(self, size: tuple[int, int]) -> int:
-        """Return the rows that are kept of a sensor."""
-        return self.rows or (DDD17_ROWS if size == DDD17 else size[1])
-
-
 def write_event_images(
     name: str,
     slices: Iterator[Slice],
     images: Iterator[NDArray[Any]],
     size: tuple[int, int],
     folder: Path,
-    settings: SegmentationSettings,
+    how: Mapping[str, Any],
 ) -> int:
-    """Write a picture of events for each image, and the image; return how many."""
-    events_in, images_in = (folder / kind / settings.split for kind in ("events", "images"))
+    """Write a picture of events for each image, and the image; return how many.
+
+    `how` are :class:`adv2e.options.SegmentationOptions`.
+    """
+    events_in, images_in = (folder / kind / how["split"] for kind in ("events", "images"))
     for place in (events_in, images_in):
         place.mkdir(parents=True, exist_ok=True)
-    rows = settings.rows_of(size)
+    rows = how["rows"] or (DDD17_ROWS if size == DDD17 else size[1])
+    is_scaled = how["counts"] == "scaled"
     number = 0
     for part, image in zip(slices, images, strict=True):
         kept = part.events[part.events["y"] < rows]
         window = part.start_us, part.stop_us
-        picture = event_image(kept, (size[0], rows), window, scale_counts=settings.scale_counts)
+        picture = event_image(kept, (size[0], rows), window, scale_counts=is_scaled)
         stem = f"{name}_export_{number}"
         np.save(events_in / f"{stem}.npy", picture, allow_pickle=False)
         save_picture(images_in / f"{stem}.png", image[:rows])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import time
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from adv2e.conversion.transfer import clock_of, side_of
 from adv2e.errors import UsageError, warn
 from adv2e.exporting import e2vid, ev_segnet
 from adv2e.exporting.layouts import LAYOUTS, Layout, check_kind, chosen_options
-from adv2e.exporting.sequence import MADE_BY_US, Sequence, is_tree, open_sequences
+from adv2e.exporting.sequence import MADE_BY_US, Sequence, check_once, is_tree, open_sequences
 from adv2e.exporting.targets import Targets
 from adv2e.exporting.voxels import before_images
 from adv2e.files.regular import shown
@@ -153,7 +152,8 @@ def export_unit(
     how = {**chosen_options(to, options), "threads": options["threads"]}
     (sequence,) = open_sequences([events], **chosen(EventInput, options))
     with Staging(True, sequence.file.inputs) as staging, writing(output):
-        made = staging.file(output) if output.suffix else staging.folder(output, lambda path: None)
+        is_file = LAYOUTS[to].has_classes
+        made = staging.file(output) if is_file else staging.folder(output, lambda path: None)
         staging.prepare()
         _, items = LAYOUTS[to].write(sequence, made, how, doubt)
     for problem in dict.fromkeys(sequence.file.facts.problems):
@@ -169,8 +169,7 @@ def _units(layout: Layout, how: Mapping[str, Any], of_tree: bool) -> Write:
         for sequence in sequences:
             place, label, split = layout.place_of(sequence.name, how["valid"])
             rows.append((str(place), label, split))
-        if twice := [row for row, number in Counter(rows).items() if number > 1]:
-            raise UsageError(f"two recordings would both be {twice[0][0]}: rename one")
+        check_once([row[0] for row in rows])
         for sequence, (where, *_) in zip(sequences, rows, strict=True):
             size, items = layout.write(sequence, folder / where, how, told["doubts"].append)
             told["sequences"].append({"name": sequence.name, "size": list(size), "items": items})
@@ -190,14 +189,13 @@ def write_list(path: Path, rows: Iterable[tuple[str, str, str]]) -> None:
 
 
 def _ev_segnet(how: Mapping[str, Any]) -> Write:
-    drawn = ev_segnet.SegmentationSettings(how["split"], how["rows"], how["counts"] == "scaled")
-
     def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
+        check_once([sequence.flat for sequence in sequences])
         for sequence in sequences:
             size, _, parts = events_in_order(sequence.file)
             slices = before_images(parts, sequence.image_times_us, how["window_us"])
             images = (image for _, image in e2vid.images_of(sequence))
-            items = ev_segnet.write_event_images(sequence.flat, slices, images, size, folder, drawn)
+            items = ev_segnet.write_event_images(sequence.flat, slices, images, size, folder, how)
             told["sequences"].append({"name": sequence.name, "size": list(size), "items": items})
         return sum(entry["items"] for entry in told["sequences"])
 

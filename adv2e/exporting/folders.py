@@ -5,7 +5,7 @@ rvt          ``event_representations_v2/NAME/``: ``event_representations.h5`` (`
              (windows, 2 bins, rows, columns)), ``timestamps_us.npy`` (their ends),
              ``objframe_idx_2_repr_idx.npy``; ``labels_v2/``: ``labels.npz`` (``labels``,
              ``objframe_idx_2_label_idx``), ``timestamps_us.npy``
-evreal       ``events_ts.npy`` (float64 [s]), ``events_xy.npy`` (int16, (events, 2)),
+evreal       ``events_ts.npy`` (float64 [s]), ``events_xy.npy`` (uint16, (events, 2)),
              ``events_p.npy`` (0, 1), ``images.npy`` (uint8, (images, rows, columns, 1)),
              ``images_ts.npy``, ``image_event_indices.npy`` (events before each image),
              ``metadata.json``
@@ -151,7 +151,7 @@ def write_evreal(sequence: Sequence, folder: Path, how: Mapping[str, Any], tell:
     with ExitStack() as stack:
         ts, xy, p = (
             stack.enter_context(NpyFile(folder / f"events_{name}.npy", dtype, row))
-            for name, dtype, row in (("ts", "<f8", ()), ("xy", "<i2", (2,)), ("p", "|u1", ()))
+            for name, dtype, row in (("ts", "<f8", ()), ("xy", "<u2", (2,)), ("p", "|u1", ()))
         )
         for events in parts:
             ts.add(events["t"] / 1e6)
@@ -271,7 +271,7 @@ def write_spikingjelly(sequence: Sequence, path: Path, how: Mapping[str, Any], t
     size, _, parts = events_in_order(sequence.file)
     events = np.concatenate([*parts])
     path.parent.mkdir(parents=True, exist_ok=True)
-    x, y = (events[name].astype(np.int16) for name in "xy")
+    x, y = (events[name].astype(np.int32) for name in "xy")
     np.savez_compressed(path, t=events["t"], x=x, y=y, p=events["p"])
     return size, 1
 

@@ -128,6 +128,18 @@ def open_sequences(
     UsageError, DataError
         Two have one name, there is no recording in a tree, or one cannot be read.
     """
+    found = named_paths(paths)
+    if targets is not None and len(targets) != len(found):
+        raise UsageError(f"targets: {len(targets)} for {len(found)} recordings")
+    each: Many[Targets | None] = targets or [None] * len(found)
+    return [
+        Sequence(name, open_events(path, **reading), given)
+        for (name, path), given in zip(found, each, strict=True)
+    ]
+
+
+def named_paths(paths: Many[str | Path]) -> list[tuple[str, Path]]:
+    """Return names and paths of recordings; parameters and errors as :func:`open_sequences`."""
     found = [Path(path) for path in paths]
     if is_tree(found):
         (root,) = found
@@ -137,14 +149,8 @@ def open_sequences(
         names = [_stem(path, path.relative_to(root).as_posix()) for path in found]
     else:
         names = _names(found)
-    _check_once(names)
-    if targets is not None and len(targets) != len(found):
-        raise UsageError(f"targets: {len(targets)} for {len(found)} recordings")
-    each: Many[Targets | None] = targets or [None] * len(found)
-    return [
-        Sequence(name, open_events(path, **reading), given)
-        for name, path, given in zip(names, found, each, strict=True)
-    ]
+    check_once(names)
+    return list(zip(names, found, strict=True))
 
 
 def is_tree(paths: Many[Path]) -> bool:
@@ -184,7 +190,8 @@ def _names(paths: list[Path]) -> list[str]:
     ]
 
 
-def _check_once(names: list[str]) -> None:
+def check_once(names: list[str]) -> None:
+    """Raise UsageError if two recordings would lie in one place."""
     twice = [name for name, number in Counter(names).items() if number > 1]
     if twice:
         raise UsageError(f"two inputs are called {twice[0]}: rename one, or export them one by one")

@@ -24,8 +24,12 @@ from adv2e.representations.voxel_grid import own_window
 
 
 def stacked_histogram(
-    events: Events, bins: int, size: tuple[int, int], most: int = 10, window: Window | None = None
-) -> NDArray[np.uint8]:
+    events: Events,
+    bins: int,
+    size: tuple[int, int],
+    most: int | None = 10,
+    window: Window | None = None,
+) -> NDArray[np.integer]:
     """Return the counts of events, cut off at `most`.
 
     Parameters
@@ -36,14 +40,14 @@ def stacked_histogram(
         Bins of time.
     size : (int, int)
         Width and height of the sensor [pixels].
-    most : int
-        Largest count, at most 255.
+    most : int, optional
+        Largest count, at most 255; None: all are counted.
     window : (int, int), optional
         Start and end of the bins [us]; default: times of the first and the last event.
 
     Returns
     -------
-    (2 bins, rows, columns) array of uint8
+    (2 bins, rows, columns) array of uint8; of int64 where all are counted
     """
     first, last = own_window(events) if window is None else window
     share = (events["t"] - first).astype(np.float32) / np.float32(max(last - first, 1))
@@ -51,4 +55,6 @@ def stacked_histogram(
     pixels = size[0] * size[1]
     cell = (events["p"] * np.int64(bins) + number) * pixels + pixels_of(events, size[0])
     counts = np.bincount(cell, minlength=2 * bins * pixels)
-    return np.minimum(counts, most).astype(np.uint8).reshape(2 * bins, size[1], size[0])
+    if most is not None:
+        counts = np.minimum(counts, most).astype(np.uint8)
+    return counts.reshape(2 * bins, size[1], size[0])

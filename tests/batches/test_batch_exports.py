@@ -236,6 +236,8 @@ def test_a_set_lies_in_one_folder(batch, source, tmp_path):
 
 def test_sets_for_reconstruction_hold_the_frames(batch, source, tmp_path):
     dest = tmp_path / "to"
-    assert batch(source, dest, "--export", "evreal").status == 0
-    assert np.load(dest / "evreal" / "deep_b" / "images.npy").shape == (4, 24, 32, 1)
+    (source / "deep" / "b.avi").rename(source / "deep" / "b.v1.avi")
+    for _ in range(2):
+        assert batch(source, dest, "--export", "evreal", "--overwrite").status == 0
+    assert np.load(dest / "evreal" / "deep_b.v1" / "images.npy").shape == (4, 24, 32, 1)
     assert not list(dest.rglob(".*"))

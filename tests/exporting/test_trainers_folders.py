@@ -194,7 +194,9 @@ def test_two_that_would_be_one_file_are_refused(adv2e):
     record("tree/cat/a/b.h5")
     record("tree/cat/a_b.h5")
     told = adv2e("export", "tree", "-o", "set", "--to", "spikingjelly", "--valid", "0")
-    assert "two recordings would both be events_np/train/cat/a_b.npz: rename one" in told.err
+    assert "two inputs are called events_np/train/cat/a_b.npz: rename one" in told.err
+    told = adv2e("export", "tree/cat", "-o", "set", "--to", "ev-segnet")
+    assert "two inputs are called a_b: rename one" in told.err
 
 
 # ---- A tree
