@@ -29,7 +29,7 @@ LIMITS = {
     "effects": 1615,
     "exporting": 1075,
     "files": 785,
-    "formats": 5110,
+    "formats": 5130,
     "inspection": 260,
     "kernel": 5940,
     "light": 890,
@@ -39,8 +39,8 @@ LIMITS = {
     "rendering": 740,
     "reports": 1791,
     "representations": 145,
-    "side": 845,
-    "sources": 3680,
+    "side": 850,
+    "sources": 3695,
     "synthetic": 160,
 }
 """Most lines of code of each package; of the modules beside them as ""."""

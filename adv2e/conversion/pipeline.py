@@ -369,7 +369,7 @@ def _side_of(
             raise UsageError("--side: a picture before which the sensor moves has no side data")
         return None
     place = Placement.of(recording.whole, recording.selection, fitting, config.frames.shift_px)
-    return find_side(recording.path, given, place, doubt)
+    return find_side(recording.path, given, place, doubt, recording.uncarried)
 
 
 def _side_files(

@@ -147,7 +147,7 @@ def side_of(
 ) -> SideData | None:
     """Return the side data of an event file, of which events were asked for in order."""
     place = Placement.of(Size(*file.facts.whole), file.facts.selection)
-    return find_side(file.facts.path, given, place, doubt)
+    return find_side(file.facts.path, given, place, doubt, file.facts.uncarried)
 
 
 def clock_of(file: EventFile, origin_us: int = 0) -> Clock:

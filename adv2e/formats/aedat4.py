@@ -240,6 +240,8 @@ def open_aedat4(path: Path, facts: Facts) -> EventFile:
         facts.describe(first.description, f"{path}: adv2e", "the file")
     facts.state(first.size, "the header")
     facts.stated_unit = "us"
+    others = [s for s in head.streams if s.holds not in (_EVENTS, _FRAME)]
+    facts.uncarried += [f"{s.output or s.number} ({s.holds})" for s in others]
     shots = [] if frames is None else list(_shots(path, head, frames.number, facts))
     shots = shots_in_order(shots, facts, "frames are not in the order of time: sorted")
 

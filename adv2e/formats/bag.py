@@ -433,6 +433,8 @@ class _Bag:
         topics.sort(key=lambda t: ("trigger" in t.name, "right" in t.name, t.name))
         events, images = ([t for t in topics if t.holds in kind] for kind in (_EVENTS, _IMAGES))
         event, image = facts.choose([t.track for t in events], [t.track for t in images])
+        others = (t for t in topics if t.holds not in (*_EVENTS, *_IMAGES))
+        facts.uncarried += [f"{t.name} ({t.holds})" for t in others]
         self._events = None if event is None else events[event]
         self.images = None if image is None else images[image]
         if self._events is None and self.images is None:

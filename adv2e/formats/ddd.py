@@ -56,7 +56,8 @@ from adv2e.formats.hdf5_layouts import Layout
 from adv2e.sources.frame import Frame, Shot
 from adv2e.ticks import S
 
-_SPECIAL, _POLARITY, _FRAME = range(3)
+_SPECIAL, _POLARITY, _FRAME, _IMU = range(4)
+_IMU_HERE = "IMU in dvs/data"
 
 _HEAD = struct.Struct("<hhiiiiii")
 _FRAME_HEAD = 36
@@ -94,8 +95,11 @@ def open_ddd(path: Path, facts: Facts) -> EventFile:
     DataError
         A row that is no packet, or frames that are not of one channel.
     """
-    with closing(_frames(path, Facts(path))) as frames:
+    seen = Facts(path)
+    with closing(_frames(path, seen)) as frames:
         first = next(frames, None)
+    with hdf5.opened(path) as file:
+        facts.uncarried += [*seen.uncarried, *(name for name in file if name != "dvs")]
     if first is None:
         facts.problems.append(
             f"no frame tells the size of the sensor: {_SIZE[0]}x{_SIZE[1]} taken, as in all of"
@@ -197,7 +201,10 @@ def _packets(path: Path, facts: Facts) -> Iterator[_Packet]:
         rows = data.shape[0]
         for begin in range(0, rows, _ROWS):
             end = min(begin + _ROWS, rows)
-            yield from _packets_of(data, begin, end, str(path))
+            for packet in _packets_of(data, begin, end, str(path)):
+                if packet.kind == _IMU and _IMU_HERE not in facts.uncarried:
+                    facts.uncarried.append(_IMU_HERE)
+                yield packet
             facts.progress(end, rows)
 
 

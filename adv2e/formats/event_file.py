@@ -76,6 +76,8 @@ class Facts:
         were read.
     problems : list of str
         Doubts about the file, and how they were resolved.
+    uncarried : list of str
+        What the file holds beside events and frames, such as an IMU.
     description : dict
         Description in the file, if this program wrote it.
     geometry : (int, int) or None
@@ -108,6 +110,7 @@ class Facts:
         self.crop_events = crop_events
         self.progress = progress or (lambda done, total: None)
         self.problems: list[str] = []
+        self.uncarried: list[str] = []
         self.description: dict[str, Any] = {}
         self.geometry: tuple[int, int] | None = None
         self.stated_by = ""

@@ -64,6 +64,7 @@ def _source(file: EventFile, given: GivenTimes, selection: Selection) -> Source:
         light=file.facts.light,
     )
     source.inputs += file.inputs
+    source.uncarried = file.facts.uncarried
     return source
 
 

@@ -13,6 +13,7 @@ References
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -49,6 +50,10 @@ _PLUGINS = {32001: "Blosc", 32004: "LZ4", 32008: "bitshuffle", 32015: "Zstandard
 
 _FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError)
 """Exceptions of h5py for files that are damaged."""
+
+
+_SIDE = re.compile("imu|pose|odom|gps|depth|flow|lidar|velodyne|label|trigger|masks?$")
+"""Words of names of side data."""
 
 
 @contextmanager
@@ -102,6 +107,13 @@ def find(file: h5py.File, name: str) -> h5py.Group | h5py.Dataset | None:
     if isinstance(here, h5py.Dataset):
         _check_own(here, label)
     return here if isinstance(here, (h5py.Group, h5py.Dataset)) else None
+
+
+def besides(file: h5py.File, group: str = "") -> list[str]:
+    """Return the names of what, by its name, is side data: in the file, and in a group of it."""
+    places = ("", f"{group}/") if group else ("",)
+    held = [f"{place}{name}" for place in places for name in file[f"/{place}"]]
+    return sorted(name for name in held if _SIDE.search(name.rpartition("/")[2].lower()))
 
 
 def is_dataset(file: h5py.File, name: str) -> bool:

@@ -122,6 +122,7 @@ class Layout:
                 here = self.of(*hdf5.choose(file, facts, self.events.format("t"), self.frames))
             group = here.events.rpartition("/")[0]
             hdf5.describe(file, facts, here.events, group, f"{group}/calib")
+            facts.uncarried += hdf5.besides(file, group)
             offset = 0
             if self.offset and hdf5.find(file, self.offset) is not None:
                 offset = hdf5.number(file, self.offset)

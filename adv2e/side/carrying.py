@@ -6,7 +6,7 @@ input, or where ``--side`` says.  Of several places for one kind, the first that
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Protocol
@@ -113,7 +113,11 @@ class SideData:
 
 
 def find_side(
-    source: str | Path, given: str | Path | None, place: Placement, tell: Tell
+    source: str | Path,
+    given: str | Path | None,
+    place: Placement,
+    tell: Tell,
+    uncarried: Iterable[str] = (),
 ) -> SideData | None:
     """Return the side data of an input; None: it has none, or none are wanted.
 
@@ -127,6 +131,8 @@ def find_side(
         Where the frames lie on the sensor.
     tell : callable
         Takes lines on what cannot be carried.
+    uncarried : iterable of str
+        What is within the input itself, and cannot be carried.
 
     Raises
     ------
@@ -135,7 +141,7 @@ def find_side(
     """
     if str(given) == "none" or (given is None and str(source) == "-"):
         return None
-    found = SideData(place)
+    found = SideData(place, rest=[*uncarried])
     for files in _roots(Path(source), given):
         names, before = _Names(files), len(found.labels)
         for kind in [*_PLACES, *_FOLDERS]:

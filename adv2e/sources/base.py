@@ -77,6 +77,8 @@ class Source(ABC):
         Things to tell the user before any work.
     notes : list of str
         Things to tell the user.
+    uncarried : list of str
+        What it holds beside frames and events, such as an IMU.
     threads : int
         Threads that decoding may use; one, unless set otherwise before `frames`.
     packages : tuple of str
@@ -111,6 +113,7 @@ class Source(ABC):
         self.largest_read = 0.0
         self.doubts: list[str] = []
         self.notes: list[str] = []
+        self.uncarried: list[str] = []
         self.count: int | None = None
         self.threads = 1
         self.packages: tuple[str, ...] = ()

@@ -121,6 +121,29 @@ def test_a_list_does_what_one_exposure_for_all_does(stack, interpolation, tmp_pa
     )
 
 
+def test_starts_and_ends_in_files_of_their_own(stack, tmp_path):
+    starts = np.arange(12) * STEP_NS // 1000
+    places = [tmp_path / f"Exposure_{name}.txt" for name in ("start", "end")]
+    for path, after in zip(places, (0, 4000), strict=True):
+        path.write_text("".join(f"{start + after}\n" for start in starts))
+    (tmp_path / "both.txt").write_text(
+        "start_us end_us\n" + "".join(f"{start} {start + 4000}\n" for start in starts)
+    )
+    convert(stack, tmp_path / "a.h5", "ideal", timestamps=places[0], time_unit="us")
+    convert(stack, tmp_path / "b.h5", "ideal", timestamps=tmp_path / "both.txt")
+    a, b = (read_events(tmp_path / f"{name}.h5").events for name in "ab")
+    assert a.tobytes() == b.tobytes()
+    places[1].write_text("1\n" * 11)
+    with pytest.raises(DataError, match=r"Exposure_end\.txt: 11 lines for the 12 of Exposure_st"):
+        convert(stack, tmp_path / "c.h5", "ideal", timestamps=places[0])
+    places[1].write_text("1\n" * 12)
+    with pytest.raises(DataError, match=r"Exposure_start\.txt line 2: the exposure ends before"):
+        convert(stack, tmp_path / "c.h5", "ideal", timestamps=places[0], time_unit="us")
+    places[1].write_text("1\n" * 11 + "x\n")
+    with pytest.raises(DataError, match=r"Exposure_end\.txt: expected one number a line"):
+        convert(stack, tmp_path / "c.h5", "ideal", timestamps=places[0])
+
+
 def test_a_video_has_none_of_its_own(tmp_path):
     writer = cv2.VideoWriter(str(tmp_path / "a.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 30, (64, 48))
     for dn in (50, 90):

@@ -108,6 +108,7 @@ _TIME = re.compile(
     r"([\s_(\[-].*)?|s|ms|us|ns|[mun]secs?|(?:milli|micro|nano)seconds"
 )
 _START = re.compile(r"(exposure[\s_-]?)?(start|begin)([\s_(\[-].*)?")
+_STARTS = re.compile(r"(?i)(exposures?[\s_-]?)(?:start|begin)(?=[^a-z]|$)")
 _END = re.compile(r"(exposure[\s_-]?)?(end|stop)([\s_(\[-].*)?")
 _NAME = re.compile(
     r"(image|img|frame|rgb|color|colour)?[\s_-]?(file|name|filename|image|img|path|filepath)"
@@ -167,8 +168,8 @@ class Table:
         return ", ".join(words)
 
 
-def table_of(text: str, label: str) -> Table:
-    """Cut a list into fields, and settle what its columns are.
+def table_of(text: str, label: str, heading: str = "") -> Table:
+    """Cut a list into fields, and settle what its columns are; `heading` as in :func:`parse_list`.
 
     Raises
     ------
@@ -177,6 +178,7 @@ def table_of(text: str, label: str) -> Table:
         and line.
     """
     rows, comments = _rows(text)
+    comments = [heading, *comments]
     if not rows:
         raise DataError(f"{label}: no times in it; one time a line is expected")
     lines = _cut_alike(rows)
@@ -383,11 +385,35 @@ def first_name(text: str, label: str) -> str:
 def read_list(path: Path, **evidence: Any) -> FrameList:
     """Read a list of frames from a file; parameters and errors as :func:`parse_list`.
 
-    What lies beside our own ``adv2e.json`` is in seconds.
+    What lies beside our own ``adv2e.json`` is in seconds.  Starts of exposures whose ends lie
+    beside them, ``Exposure_start.txt`` and ``Exposure_end.txt``, are read with these.
     """
     if path.name == "images.txt" and path.with_name("adv2e.json").is_file():
         evidence.setdefault("stated", "s")
-    return parse_list(_text(path), str(path), **evidence)
+    text, ends = _text(path), path.with_name(_STARTS.sub(r"\1end", path.name))
+    if ends != path and ends.is_file():
+        text, evidence["heading"] = _paired(text, path, ends)
+    return parse_list(text, str(path), **evidence)
+
+
+def _paired(text: str, path: Path, ends: Path) -> tuple[str, str]:
+    """Return starts and ends of exposures as one list, on the lines of the starts, and a heading.
+
+    Raises
+    ------
+    DataError
+        Their numbers differ, or a line is no number.
+    """
+    (starts, said), (stops, _) = _rows(text), _rows(_text(ends))
+    if len(starts) != len(stops):
+        raise DataError(f"{ends}: {len(stops)} lines for the {len(starts)} of {path.name}")
+    if not all(_is_number(line) for _, line in (*starts, *stops)):
+        raise DataError(f"{path}, {ends.name}: expected one number a line, a start or an end")
+    both = zip(starts, stops, strict=True)
+    lines = {number: f"{line},{stop}" for (number, line), (_, stop) in both}
+    unit = next(filter(None, map(_unit_of_heading, said)), "")
+    last = max(lines, default=0)
+    return "\n".join(lines.get(n, "#") for n in range(1, last + 1)), f"start_{unit},end"
 
 
 def _text(path: Path) -> str:
@@ -417,6 +443,7 @@ def parse_list(
     time_unit: str | None = None,
     stated: str | None = None,
     own_step_s: float | None = None,
+    heading: str = "",
 ) -> FrameList:
     """Read a list of frames.
 
@@ -431,6 +458,8 @@ def parse_list(
         What the user says of the unit.
     stated, own_step_s
         What else tells of it; see :func:`adv2e.sources.times.rates.frame_unit`.
+    heading : str
+        Words for the columns, where the list has none of its own.
 
     Raises
     ------
@@ -439,7 +468,7 @@ def parse_list(
         read, a time that occurs twice, times that do not increase, or an empty list; the text names
         the line.
     """
-    table = table_of(text, label)
+    table = table_of(text, label, heading)
     fields = [line.fields[table.time] for line in table.lines]
     unit = frame_unit(
         [Decimal(field) for field in fields],
