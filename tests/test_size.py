@@ -39,7 +39,7 @@ LIMITS = {
     "rendering": 740,
     "reports": 1791,
     "representations": 145,
-    "side": 850,
+    "side": 860,
     "sources": 3695,
     "synthetic": 160,
 }

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from adv2e import __version__
-from adv2e.conversion.transfer import clock_of, side_of
+from adv2e.conversion.transfer import clock_of
 from adv2e.errors import UsageError, warn
 from adv2e.exporting import e2vid, ev_segnet
 from adv2e.exporting.layouts import LAYOUTS, Layout, check_kind, chosen_options
@@ -260,7 +260,7 @@ def _exported(
         See :func:`adv2e.formats.reading.open_events`.
     """
     began = time.perf_counter()
-    sequences = open_sequences(paths, **reading)
+    sequences = open_sequences(paths, side=side, **reading)
     told: dict[str, Any] = {"sequences": [], "doubts": []}
     read = [one for sequence in sequences for one in sequence.file.inputs]
     with Staging(overwrite, read) as staging, writing(output):
@@ -269,7 +269,8 @@ def _exported(
         folder.mkdir()
         items = write(sequences, folder, told)
         for sequence in sequences:
-            _write_side(sequence, side, folder / "side" / sequence.name, told["doubts"].append)
+            _write_side(sequence, folder / "side" / sequence.name)
+            told["doubts"] += sequence.told
         doubts = told.pop("doubts")
         entries = sorted([entry.name for entry in folder.iterdir()] + [DESCRIPTION])
         inputs = [
@@ -291,13 +292,11 @@ def _exported(
     return Exported(str(output), len(sequences), items, what, time.perf_counter() - began)
 
 
-def _write_side(
-    sequence: Sequence, given: str | Path | None, folder: Path, tell: Callable[[str], None]
-) -> None:
+def _write_side(sequence: Sequence, folder: Path) -> None:
     """Write the side data of a recording, whose events were read, on the clock of its events."""
-    side = side_of(sequence.file, given, tell)
-    if side is not None:
-        write_side(folder, side.files(partial(clock_of, sequence.file), tell))
+    if sequence.side is not None:
+        clock = partial(clock_of, sequence.file)
+        write_side(folder, sequence.side.files(clock, sequence.told.append))
 
 
 def foreign(folder: Path) -> str | None:

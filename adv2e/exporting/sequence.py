@@ -8,16 +8,18 @@ from collections import Counter
 from collections.abc import Iterator
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
+from adv2e.conversion.transfer import clock_of, side_of
 from adv2e.errors import DataError, UsageError
-from adv2e.exporting.targets import Targets, targets_beside
+from adv2e.exporting.targets import Targets, targets_of
 from adv2e.files.regular import beside
 from adv2e.formats.event_file import EventFile
 from adv2e.formats.reading import open_events, shots_of
 from adv2e.formats.registry import may_hold_events
+from adv2e.side.carrying import SideData
 
 TRAIN, VALID, TEST = "train", "valid", "test"
 _SPLITS = {
@@ -41,11 +43,19 @@ class Sequence:
     ----------
     name : str
         Of a tree, its path below the folder without suffix, with ``/``.
+    given : Targets, optional
+        Boxes and flow in place of those of its side data.
+    side_given : str or Path, optional
+        Where its side data are.
+    told : list of str
+        Lines for people on its side data.
     """
 
     name: str
     file: EventFile
     given: Targets | None = field(default=None, compare=False)
+    side_given: str | Path | None = None
+    told: list[str] = field(default_factory=list, compare=False)
 
     @cached_property
     def image_times_us(self) -> list[int]:
@@ -57,20 +67,23 @@ class Sequence:
 
     @cached_property
     def targets(self) -> Targets:
-        """Boxes and flow: those that were given, or lie beside it.
+        """Boxes and flow: those that were given, as they are, or of its side data.
 
         Raises
         ------
         DataError
-            A file of them is wrong; or the sensor is cut or turned, and they are not.
+            They are not of the recording; or they were given, and its events are cut or turned.
         """
         facts = self.file.facts
-        found = targets_beside(facts.path) if self.given is None else self.given
         asked = {"--crop": facts.selection.crop, "--rotate180": facts.selection.rotate180}
-        for option in (name for name, value in asked.items() if value):
-            if found.boxes is not None or found.flow:
-                raise DataError(f"{facts.path}: {option} does not change its boxes and flow")
-        return found
+        for option in (name for name, value in asked.items() if value and self.given):
+            raise DataError(f"{facts.path}: {option} does not change targets that are given")
+        return self.given or targets_of(self.side, partial(clock_of, self.file))
+
+    @cached_property
+    def side(self) -> SideData | None:
+        """Its side data, once its events were asked for in order; what is not carried is told."""
+        return side_of(self.file, self.side_given, self.told.append)
 
     @property
     def flat(self) -> str:
@@ -114,14 +127,17 @@ def in_class(name: str) -> tuple[str, str]:
 
 
 def open_sequences(
-    paths: Many[str | Path], targets: Many[Targets] | None = None, **reading: Any
+    paths: Many[str | Path],
+    targets: Many[Targets] | None = None,
+    side: str | Path | None = None,
+    **reading: Any,
 ) -> list[Sequence]:
     """Open recordings; each is called as its file, or as its folder and its file.
 
     One folder that is no recording is a tree: all recordings below it, called by their paths.
 
     `reading` as :func:`adv2e.formats.reading.open_events` takes it; `targets` are those of each,
-    in the place of what lies beside them.
+    in the place of what lies beside them, which `side` tells.
 
     Raises
     ------
@@ -133,7 +149,7 @@ def open_sequences(
         raise UsageError(f"targets: {len(targets)} for {len(found)} recordings")
     each: Many[Targets | None] = targets or [None] * len(found)
     return [
-        Sequence(name, open_events(path, **reading), given)
+        Sequence(name, open_events(path, **reading), given, side)
         for (name, path), given in zip(found, each, strict=True)
     ]
 

@@ -199,16 +199,23 @@ def of_yolo(files: Mapping[str, bytes], label: str) -> Boxes:
 
 def of_prophesee(data: bytes, label: str) -> Boxes:
     """Read a ``_bbox.npy``; DataError if it is none."""
-    array = read_array(io.BytesIO(data), len(data), label)
+    array = with_fields(read_array(io.BytesIO(data), len(data), label), label)
+    rows = np.array([array[name] for name in PROPHESEE.names or ()], np.float64).T
+    return Boxes(label, rows, timed=True)
+
+
+def with_fields(array: NDArray[Any], label: str) -> NDArray[Any]:
+    """Return boxes as PROPHESEE, by time; DataError unless they have its fields, or older ones."""
     names = {_NAMES.get(name, name): name for name in array.dtype.names or ()}
-    needed = ("t", "x", "y", "w", "h")
+    needed = ("t", "x", "y", "w", "h", "class_id")
     if array.ndim != 1 or not {*needed} <= {*names}:
         raise DataError(f"{label}: not boxes of Prophesee, with fields {', '.join(needed)}")
-    rows = np.full((len(array), 8), (*(0,) * 7, 1), np.float64)
-    for at, name in enumerate(PROPHESEE.names or ()):
-        if name in names:
-            rows[:, at] = array[names[name]]
-    return Boxes(label, rows, timed=True)
+    boxes = np.zeros(len(array), PROPHESEE)
+    boxes["class_confidence"] = 1
+    for name, own in names.items():
+        if name in (PROPHESEE.names or ()):
+            boxes[name] = array[own]
+    return boxes[np.argsort(boxes["t"], kind="stable")]
 
 
 def _numbers(data: bytes, label: str, mark: str | None, least: int) -> NDArray[np.float64]:

@@ -154,6 +154,10 @@ def find_side(
                 tell(f"{error}: not carried")
         if len(found.labels) > before or names.files.names("mav0"):
             found.rest += names.rest(found, Path(source).name)
+    boxed = _boxes_beside(Path(source))
+    if given is None and "boxes" not in found.labels and boxed.is_file():
+        found.kinds["boxes"] = boxes.of_prophesee(boxed.read_bytes(), str(boxed))
+        found.labels["boxes"] = boxed.name
     if given is not None and not found.labels:
         known = [name for one in (*_PLACES.values(), *_FOLDERS.values()) for name in one[:1]]
         raise DataError(f"{given}: no side data in it that is known, such as {', '.join(known)}")
@@ -170,7 +174,8 @@ def places_of(source: Path) -> list[Path]:
     kinds = [*_PLACES.values(), *_FOLDERS.values(), (_LABELS,)]
     roots = [files.path for files in _roots(source, None) if files.path != source.absolute()]
     found = (root / name for root in roots for kind in kinds for name in kind)
-    return sorted({path for path in found if path.exists() and path != source.absolute()})
+    places = {*found, _boxes_beside(source.absolute())}
+    return sorted(path for path in places if path.exists() and path != source.absolute())
 
 
 def _roots(source: Path, given: str | Path | None) -> Iterator[Members]:
@@ -192,6 +197,11 @@ def _roots(source: Path, given: str | Path | None) -> Iterator[Members]:
         if whole.name not in _INSIDE or not (above / _INSIDE[whole.name]).exists():
             return
         whole = above
+
+
+def _boxes_beside(source: Path) -> Path:
+    """Return the place of boxes beside a file of events, as Prophesee's sets have it."""
+    return source.with_name(f"{source.stem.removesuffix('_td')}_bbox.npy")
 
 
 class _Names:

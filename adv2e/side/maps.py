@@ -112,6 +112,16 @@ class Maps:
             raise DataError(f"{self.label}: its times are not those of the frames")
         return np.asarray(apart.argmin(-1), np.int64)
 
+    def when(self, clock: Clock) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return the times on the events' clock [ns], (files, 1 or 2), and which are wanted."""
+        if self.times is None:
+            numbers, last = self.frames(clock), len(clock.frames) - 1
+            times, wanted = clock.of_frames(np.minimum(numbers, last))
+            wanted &= numbers <= last
+        else:
+            times, wanted = clock.of(self.times)
+        return times, np.asarray(wanted.all(axis=1))
+
     def written(self, place: Placement, clock: Clock) -> Iterator[tuple[str, bytes]]:
         """Yield names and bytes of the maps on the sensor that are wanted, and of their list.
 
@@ -122,13 +132,8 @@ class Maps:
         """
         lines: list[str] = []
         wrong: list[str] = []
-        if self.times is None:
-            numbers, last = self.frames(clock), len(clock.frames) - 1
-            times, wanted = clock.of_frames(np.minimum(numbers, last))
-            wanted &= numbers <= last
-        else:
-            times, wanted = clock.of(self.times)
-        for number in np.flatnonzero(wanted.all(axis=1)).tolist():
+        times, wanted = self.when(clock)
+        for number in np.flatnonzero(wanted).tolist():
             try:
                 data = self.read(self.names[number])
                 made = self._on_sensor(self._map_in(data, self.names[number], place), place)

@@ -426,11 +426,39 @@ def test_flow_at_other_times_is_refused():
         package.export("a.h5", "set", "e2vid", targets=targets, doubt=lambda text: None)
 
 
-def test_what_lies_beside_is_not_cut(adv2e):
+def test_what_lies_beside_is_cut_and_turned_as_the_events_are(adv2e):
     record("a.h5")
-    np.save("a_bbox.npy", boxes_at([60_000]))
-    told = adv2e("export", "a.h5", "-o", "set", "--to", "rvt", "--crop", "0,0,20,20")
-    assert "a.h5: --crop does not change its boxes and flow" in told.err
+    boxes = boxes_at([60_000, 110_000], width=20.0)
+    boxes["h"] = 25
+    np.save("a_bbox.npy", boxes)
+    Path("a.h5.side/flow").mkdir(parents=True)
+    flow = np.indices(SIZE[::-1]).transpose(1, 2, 0)[..., ::-1].astype(np.float32)  # its place
+    np.save("a.h5.side/flow/0.npy", flow)
+    Path("a.h5.side/flow.txt").write_text("0.04 0.08 flow/0.npy\n")
+    for number, turned in enumerate((False, True)):
+        how = ("--crop", "6,4,20,18", *(["--rotate180"] if turned else []))
+        for kind in ("rvt", "dsec"):
+            done = adv2e("export", "a.h5", "-o", f"{kind}{number}", "--to", kind, *how)
+            assert (done.status, "not carried" in done.err) == (0, False)
+        labels = np.load(next(Path(f"rvt{number}").rglob("labels.npz")))["labels"]
+        for found, box in zip(labels, boxes, strict=True):
+            x, y, w, h = (float(box[name]) for name in "xywh")
+            if turned:
+                x, y = WIDTH - x - w, HEIGHT - y - h
+            left, right = np.clip((x - 6, x + w - 6), 0, 19)  # RVT ends at the last pixel
+            top, low = np.clip((y - 4, y + h - 4), 0, 17)
+            expected = left, top, right - left, low - top
+            assert [float(found[name]) for name in "xywh"] == pytest.approx(expected)
+        picture = cv2.imread(str(next(Path(f"dsec{number}").rglob("forward/*.png"))), -1)
+        u, v = ((picture[..., at].astype(float) - 2**15) / 128 for at in (2, 1))
+        assert picture.shape == (18, 20, 3)
+        across, down = np.arange(6, 26), np.arange(4, 22)[:, np.newaxis]
+        if turned:
+            across, down = across - (WIDTH - 1), down - (HEIGHT - 1)  # the place, and its sign
+        assert np.array_equal(u, np.broadcast_to(across, u.shape))
+        assert np.array_equal(v, np.broadcast_to(down, v.shape))
+    with pytest.raises(DataError, match="crop does not change targets that are given"):
+        package.export("a.h5", "x", "rvt", targets=[Targets.of(boxes)], crop=(6, 4, 20, 18))
 
 
 # ---- DSEC
