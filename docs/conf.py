@@ -24,7 +24,6 @@ html_show_sourcelink = False
 html_math_renderer = "mathml"
 pygments_style = "default"
 
-autodoc_preserve_defaults = True
 autodoc_typehints = "none"  # docstrings say them, with units
 napoleon_google_docstring = False
 napoleon_use_param = False  # types there are sentences, not names to be linked
@@ -45,8 +44,13 @@ def _block(self, node):
     raise SkipNode
 
 
+def _signature(app, what, name, obj, options, signature, returned):
+    return (signature or "").replace("<function <lambda>>", "...") or None, returned
+
+
 def setup(app: Sphinx) -> None:
     """Write equations as MathML, which browsers show without a script and without network."""
+    app.connect("autodoc-process-signature", _signature)
     app.add_html_math_renderer(
         "mathml", inline_renderers=(_inline, None), block_renderers=(_block, None)
     )
