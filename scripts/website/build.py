@@ -22,6 +22,8 @@ import click
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts"))
 
+from writing import one_line_errors  # noqa: E402
+
 from website import effects, reference  # noqa: E402
 
 FIRST = Path("docs/README.md")
@@ -60,6 +62,8 @@ def stage(source: Path) -> None:
         target.parent.mkdir(parents=True, exist_ok=True)
         text = as_markdown((ROOT / place).read_text("utf-8"), place.suffix)
         text = "".join(_part(part, place, page, known, source) for part in _parts(text))
+        if place.suffix == ".ipynb":
+            text += f"\n\n[Download this notebook]({_copied(place, page, source)})\n"
         target.write_text(text, "utf-8")
     with (source / "index.md").open("a", encoding="utf-8") as index:
         index.write("\n".join(_menu(known)))
@@ -96,12 +100,17 @@ def _part(text: str, place: Path, page: str, known: dict[Path, str], source: Pat
             return f"{begin}{_between(page, known[target])}.md{anchor or ''}{end}"
         if not (ROOT / target).is_file():  # a folder
             return begin.lstrip("!").removeprefix("[").removesuffix("](")
-        copy = source / "_files" / target
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(ROOT / target, copy)
-        return f"{begin}{_between(page, f'_files/{target.as_posix()}')}{end}"
+        return f"{begin}{_copied(target, page, source)}{end}"
 
     return _LINK.sub(moved, text)
+
+
+def _copied(file: Path, page: str, source: Path) -> str:
+    """Copy a file of the repository beside the pages; return where it is, seen from a page."""
+    copy = source / "_files" / file
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(ROOT / file, copy)
+    return _between(page, f"_files/{file.as_posix()}")
 
 
 def _between(page: str, other: str) -> str:
@@ -133,15 +142,17 @@ def _tree(title: str, chosen: Iterable[str]) -> Iterator[str]:
 
 @click.command()
 @click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    default=ROOT / "build" / "docs",
-    show_default="build/docs",
-    help="Folder of the site, its sources and pictures.",
-)
+    "-o", "--output", type=click.Path(path_type=Path), default=ROOT / "build" / "docs",
+    help="Folder of the site, its sources and its pictures.  [default: build/docs]",
+)  # fmt: skip
+@one_line_errors()
 def main(output: Path) -> None:
     """Build the site of the documentation; a warning is an error."""
+    mark = output / ".site-of-adv2e"
+    if output.is_dir() and any(output.iterdir()) and not mark.exists():
+        raise click.ClickException(f"{output}: holds other files; name a new or an empty folder")
+    output.mkdir(parents=True, exist_ok=True)
+    mark.touch()
     source, pictures = output / "source", output / "pictures"
     shutil.rmtree(source, ignore_errors=True)
     stage(source)

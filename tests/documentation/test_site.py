@@ -71,6 +71,16 @@ def test_pictures_differ_with_the_effect():
         assert len(events_of(shown, ())) != len(events_of(shown, shown.sets))
 
 
+def test_a_folder_with_other_files_is_left_alone(tmp_path):
+    (tmp_path / "source").mkdir()
+    (tmp_path / "source" / "thesis.tex").write_text("mine")
+    build = [sys.executable, str(ROOT / "scripts" / "website" / "build.py"), "-o", str(tmp_path)]
+    done = subprocess.run(build, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == f"Error: {tmp_path}: holds other files; name a new or an empty folder\n"
+    assert (tmp_path / "source" / "thesis.tex").exists()
+
+
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.version_info < (3, 11), reason="Sphinx needs Python 3.11")
 def test_the_site_is_built_without_a_warning(tmp_path):
@@ -90,5 +100,6 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     # links lead from page to page, also where they led to a file beside the code
     peers = (site / "peers.html").read_text("utf-8")
     assert 'href="code/scripts_experiments.html#direct-comparison"' in peers
+    assert [*site.rglob("first_events.ipynb")]
     menu = Document.read(ROOT / "docs" / "README.md")
     assert len(menu.links()) > 25
