@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import click
@@ -148,6 +149,8 @@ def _tree(title: str, chosen: Iterable[str]) -> Iterator[str]:
 @one_line_errors()
 def main(output: Path) -> None:
     """Build the site of the documentation; a warning is an error."""
+    if find_spec("myst_parser") is None:
+        raise click.ClickException("needs Python 3.11 or later, and: pip install -e '.[docs]'")
     mark = output / ".site-of-adv2e"
     if output.is_dir() and any(output.iterdir()) and not mark.exists():
         raise click.ClickException(f"{output}: holds other files; name a new or an empty folder")

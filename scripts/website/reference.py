@@ -123,8 +123,8 @@ def _is_own(key: Key, section: Key) -> bool:
 def _python() -> str:
     lines = [
         "# Python\n",
-        "Everything that users call is in `adv2e` itself; only what needs PyTorch is apart.\n",
         "```{eval-rst}",
+        ".. automodule:: adv2e\n   :no-members:\n",
     ]
     names = [name for name in adv2e.__all__ if not name.startswith("__")]
     for title_, chosen in (

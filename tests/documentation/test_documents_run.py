@@ -29,6 +29,7 @@ RIVALS = {"refractory", "event_loss"}
 
 FOUND = {
     "README.md": ("found", "refractory", {"pixel.refractory.period_us": 4e3}),
+    "docs/tutorials/own_camera.md": ("found", "refractory", {"pixel.refractory.period_us": 4e3}),
     "docs/diagnosis.md": ("found", "refractory", {"pixel.refractory.period_us": 1e4}),
     "docs/own_effects.md": ("again", "echo", {"user.echo.share": 0.3}),
 }
