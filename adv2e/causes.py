@@ -13,7 +13,7 @@ number name                 cause of the event
                             the signal
 ====== ==================== ====================================================================
 
-A threshold that is crossed may have several causes.  ``adv2e/effects/README.md`` says which one
+A threshold that is crossed may have several causes.  ``docs/own_effects.md`` says which one
 counts.  The numbers are in files: they never change.
 """
 

@@ -23,8 +23,8 @@ find_python() {
     return 1
 }
 
-# install_adv2e EXTRAS: install the package, in place, with EXTRAS ("" or "[test]"), unless that is
-# done already for this pyproject.toml, interpreter and place
+# install_adv2e EXTRAS: install the package, in place, with EXTRAS ("", "[docs]" or "[test]", which
+# holds all others), unless that is done already for this pyproject.toml, interpreter and place
 install_adv2e() {
     local base stamp wanted
     if ! works .venv/bin/python; then

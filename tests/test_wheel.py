@@ -1,7 +1,8 @@
-"""The shipped configurations work from a wheel, outside the clone."""
+"""What is built is whole and fit for an index, and works outside the clone."""
 
 import subprocess
 import sys
+import tarfile
 import zipfile
 from pathlib import Path
 
@@ -11,12 +12,16 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.mark.thorough
-def test_wheel_holds_the_shipped_configurations(tmp_path):
-    pytest.importorskip("hatchling")
+def test_wheel_of_the_sources_holds_the_shipped_configurations(tmp_path):
+    build = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(tmp_path), str(ROOT)]
+    subprocess.run(build, check=True, capture_output=True)  # the wheel, of the sources' archive
+    (wheel,), (sources,) = tmp_path.glob("adv2e-*.whl"), tmp_path.glob("adv2e-*.tar.gz")
+    check = [sys.executable, "-m", "twine", "check", "--strict", str(wheel), str(sources)]
+    subprocess.run(check, check=True, capture_output=True)
+    with tarfile.open(sources) as files:
+        inside = {name.partition("/")[2] for name in files.getnames()}
+    assert {"docs/conf.py", "scripts/docs", "tests/conftest.py", "CITATION.cff"} <= inside
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet"]
-    options = ["--no-deps", "--no-build-isolation"]
-    subprocess.run([*pip, "wheel", *options, "-w", str(tmp_path), str(ROOT)], check=True)
-    (wheel,) = tmp_path.glob("adv2e-*.whl")
     with zipfile.ZipFile(wheel) as files:  # what it starts in meets signals before all is imported
         (listed,) = (name for name in files.namelist() if name.endswith("entry_points.txt"))
         assert b"adv2e = adv2e.__main__:main" in files.read(listed)

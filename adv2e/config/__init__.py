@@ -56,8 +56,8 @@ def load_config(
     Parameters
     ----------
     files : str, Path, mapping, Config, or a sequence of them, optional
-        YAML files, names of shipped configurations (:func:`shipped`), mappings of the same keys,
-        and configurations, which say all keys.
+        YAML files, names of shipped configurations (``adv2e config list``), mappings of the same
+        keys, and configurations, which say all keys.
     sets : str or sequence of str
         Single values, as in ``pixel.low_pass.cutoff_hz=100``.
     seed : int, optional

@@ -52,7 +52,7 @@ def diagnose(
         What is known of the camera.  A `sensor` must have the size of the recording.
     output : str or Path, optional
         Folder for report.html, report.json and model.yaml, which hold what is known so far until it
-        is finished (:func:`adv2e.reports.files.so_far`).  Default: none is written.
+        is finished.  Default: none is written.
     **options
         See :class:`adv2e.options.DiagnoseOptions`, :mod:`adv2e.diagnosis.known_light` for
         `light`, and :mod:`adv2e.diagnosis.film` for `film` and `films`.

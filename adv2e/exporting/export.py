@@ -70,7 +70,7 @@ def export(
     output : str or Path
         Folder to write.
     to : str
-        What to make: one of :data:`adv2e.options.EXPORTS`, such as "voxel" or "rvt".
+        What to make: a layout of ``adv2e export --to``, such as "voxel" or "rvt".
     targets : sequence of Targets, optional
         Boxes and flow of each recording; default: what lies beside it.  See
         :mod:`adv2e.exporting.targets`.

@@ -1,6 +1,6 @@
 """What networks are to find: boxes and optical flow of a recording, with their times.
 
-They are those of its side data (:mod:`adv2e.side`), placed as its events are, or arrays in memory.
+They are those of its side data (``adv2e.side``), placed as its events are, or arrays in memory.
 """
 
 from __future__ import annotations

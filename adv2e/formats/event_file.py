@@ -174,7 +174,7 @@ class Facts:
 
     @property
     def light(self) -> Light:
-        """Encoding and white of the frames; see :func:`recorded_light`."""
+        """Encoding and white of the frames; see ``recorded_light``."""
         return recorded_light(self.description, str(self.path))
 
     def note_frames(self, unit: Unit, *, whole: bool) -> None:

@@ -115,7 +115,7 @@ def read_events(
     Parameters
     ----------
     path : str or Path
-        Its suffix and its first bytes tell the format: see :mod:`adv2e.formats.registry`.
+        Its suffix and its first bytes tell the format: see docs/formats.md.
     progress : callable, optional
         Is called now and then with two numbers: how much was read, and of how much.
     **options

@@ -30,7 +30,7 @@ class Recording:
     path : str
         What was read.
     layout : str
-        ``text``, ``davis240c``, ``monash`` and others: see :mod:`adv2e.formats.registry`.
+        ``text``, ``davis240c``, ``monash`` and others: see docs/formats.md.
     width, height : int
         Geometry [pixels]; zero when nothing tells.
     events : array of EVENT_DTYPE
@@ -145,7 +145,7 @@ class Recording:
 
     @property
     def light(self) -> Light:
-        """Encoding and white of the frames; see :func:`recorded_light`."""
+        """Encoding and white of the frames; see ``recorded_light``."""
         return recorded_light(self.metadata, self.path)
 
     @property

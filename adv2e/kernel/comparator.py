@@ -74,7 +74,7 @@ def fire(i, t, polarity, cause, circuit, state, buffer, n):
 #
 # At a reset the reference becomes the signal, which is the sum of three parts: light,
 # photoreceptor noise, and additions by effects. From there on each part moves by itself, and leak
-# lowers the reference. ``adv2e/effects/README.md`` has the rule in full.
+# lowers the reference. ``docs/own_effects.md`` has the rule in full.
 
 
 @kernel

@@ -9,6 +9,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 
+GENERATED = ROOT / "docs" / "effects.md"
+"""What ``adv2e effects --all`` prints."""
+
 LANGUAGES = {"bash", "python", "yaml", "text", "csv", "bibtex"}
 """What a block may hold.  A text is what the commands before it print."""
 
@@ -153,7 +156,8 @@ class Document:
 
 
 def documents() -> list[Document]:
-    """Return all documents, the README first."""
-    below = [path for top in ("adv2e", "scripts") for path in (ROOT / top).rglob("README.md")]
-    paths = [ROOT / "README.md", *below]
+    """Return all documents that people write, the README first."""
+    forms = (("adv2e", "README.md"), ("scripts", "README.md"), ("docs", "*.md"))
+    below = [path for top, form in forms for path in (ROOT / top).rglob(form)]
+    paths = [ROOT / "README.md", *(path for path in below if path != GENERATED)]
     return [Document.read(path) for path in sorted(paths, key=lambda p: (len(p.parts), p))]

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.thorough
 
 
 def test_the_tasks_of_the_array_do_the_whole(tmp_path):
-    document = Document.read(ROOT / "adv2e" / "batches" / "README.md")
+    document = Document.read(ROOT / "docs" / "batches.md")
     (command,) = (one for one in document.commands() if one.text.startswith("sbatch "))
     _, array, *_, name, script = shlex.split(command.text)
     first, last = map(int, re.fullmatch(r"--array=(\d+)-(\d+)", array).groups())

@@ -29,8 +29,9 @@ RIVALS = {"refractory", "event_loss"}
 
 FOUND = {
     "README.md": ("found", "refractory", {"pixel.refractory.period_us": 4e3}),
-    "adv2e/diagnosis/README.md": ("found", "refractory", {"pixel.refractory.period_us": 1e4}),
-    "adv2e/effects/README.md": ("again", "echo", {"user.echo.share": 0.3}),
+    "docs/tutorials/own_camera.md": ("found", "refractory", {"pixel.refractory.period_us": 4e3}),
+    "docs/diagnosis.md": ("found", "refractory", {"pixel.refractory.period_us": 1e4}),
+    "docs/own_effects.md": ("again", "echo", {"user.echo.share": 0.3}),
 }
 """Folder of a diagnosis that a document makes, the effect that it names, and what it fits."""
 
@@ -113,7 +114,7 @@ def run_block(block: Block, adv2e, said: str) -> str:
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=() if name == "adv2e/light/README.md" else pytest.mark.thorough)
+        pytest.param(name, marks=() if name == "docs/light.md" else pytest.mark.thorough)
         for name in DOCUMENTS
     ],
 )

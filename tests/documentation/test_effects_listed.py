@@ -13,7 +13,7 @@ import pytest
 from adv2e.effects import EFFECTS
 from documentation.documents import ROOT, Document
 
-DOCUMENT = Document.read(ROOT / "adv2e" / "effects" / "README.md")
+DOCUMENT = Document.read(ROOT / "docs" / "own_effects.md")
 (EXAMPLE,) = (block.text for block in DOCUMENT.blocks if block.file == "echo.py")
 
 

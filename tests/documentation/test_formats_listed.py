@@ -5,7 +5,7 @@ from __future__ import annotations
 from adv2e.formats.registry import FORMATS, Format
 from documentation.documents import ROOT
 
-DOCUMENT = ROOT / "adv2e" / "formats" / "README.md"
+DOCUMENT = ROOT / "docs" / "formats.md"
 
 HEAD = """\
 | name | what it is | suffix | events | frames | configuration | causes | holds at most |

@@ -11,7 +11,10 @@ from documentation.documents import ROOT
 
 TEXTS = sorted(
     path
-    for folder, pattern in (("", "*.md"), ("adv2e", "*.py"), ("adv2e", "*.md"), ("configs", "*"))
+    for folder, pattern in (
+        *(("", "*.md"), ("docs", "*.md")),
+        *(("adv2e", "*.py"), ("adv2e", "*.md"), ("configs", "*")),
+    )
     for path in ((ROOT / folder).rglob(pattern) if folder else ROOT.glob(pattern))
 )
 NAMED = re.compile(rf"adv2e ({'|'.join(COMMANDS)})\b([^'`\n]*)")

@@ -15,7 +15,7 @@ B is the matrix of the mean over the exposure: its rows have sum 1 and the varia
 exposure.  Fifty steps of the Richardson-Lucy iteration [1, 2] start from the frames themselves.
 Total variation in time holds down noise and ringing [3]:
 
-    y   <-  y / (1 - lambda (g_k - g_(k-1))) * B'(DN_frame / B y) / B'1
+    y   <-  y / (1 - lambda (g_k - g_(k-1))) * B'(DN_frame / (B y)) / (B' 1)
     g_k  =  d_k / sqrt(d_k^2 + epsilon^2)
     d_k  =  2 (y_(k+1) - y_k) / (y_(k+1) + y_k)
 

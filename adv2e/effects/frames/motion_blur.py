@@ -18,7 +18,7 @@ smear first.
 B is the mean along the smear through each pixel.  It is its own transpose but for changes of v from
 pixel to pixel.  Ten steps of the Richardson-Lucy iteration start from the frame itself:
 
-    y  <-  y * B (DN_frame / B y)
+    y  <-  y * B (DN_frame / (B y))
 
 Light stays positive, and stays the same to the last bit where nothing moves.  What is finer than
 the smear is not in the frame and cannot come back, and noise of the frames grows with what does

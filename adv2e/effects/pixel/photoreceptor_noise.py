@@ -20,7 +20,7 @@ Then it is not sampled: it is drawn as finely as events need it.  Its variance i
     sigma^2 f_s/(f + f_s)
 
 so that noise falls as the light rises.  That is what two cameras do
-(adv2e/diagnosis/tables/README.md); behind the low-pass alone, rates rise with the corner.
+(docs/noise_at_rest.md); behind the low-pass alone, rates rise with the corner.
 
 Compiled in adv2e/kernel/photoreceptor/ and adv2e/kernel/stepped/signal.py.
 

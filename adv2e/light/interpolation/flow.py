@@ -18,7 +18,7 @@ twice in three of them; light that changes while it moves is blended; things sma
 from frame to frame, steps above about a fifth of the picture's height, and textures that repeat
 within a few steps are mostly not found and fade as with linear; the noise of dim frames is carried
 along, which makes more false events than blending it in place.
-``adv2e/light/README.md`` has the numbers.
+``docs/light.md`` has the numbers.
 
 References
 ----------

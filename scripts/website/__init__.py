@@ -1,0 +1,1 @@
+"""The site of the documentation: pages that people write, and pages made from the program."""
