@@ -18,7 +18,7 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1670,
+    "": 1675,
     "batches": 1515,
     "cli": 1235,
     "comparison": 1165,
@@ -36,8 +36,8 @@ LIMITS = {
     "motion": 370,
     "pixel": 575,
     "process": 265,
-    "rendering": 740,
-    "reports": 1791,
+    "rendering": 865,
+    "reports": 1767,
     "representations": 145,
     "side": 845,
     "sources": 3680,
@@ -45,7 +45,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 340
+FILES = 341
 """Most modules of all packages together."""
 
 _SLACK = 60
