@@ -677,6 +677,14 @@ class RenderOptions(RenderedPart, EventInput, total=False):
     ]
 
 
+class ViewOptions(EventInput, total=False):
+    """Options of a page on which to look at events."""
+
+    no_frames: Annotated[bool, Option(help="Leave out the frames beneath.", default=False)]
+    overwrite: Overwrite
+    progress: Progress
+
+
 WindowUs = Annotated[
     "int | None",
     Option(

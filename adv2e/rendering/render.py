@@ -94,7 +94,7 @@ def render(
         return np.ascontiguousarray(picture[:, :, ::-1], np.uint8)
 
 
-def reading_of(options: RenderOptions) -> EventInput:
+def reading_of(options: EventInput) -> EventInput:
     """Return the options of the reading: a film shows the frame before its start, too."""
     return {**chosen(EventInput, options), "start_s": None, "stop_s": None}
 
