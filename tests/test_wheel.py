@@ -1,4 +1,4 @@
-"""The shipped configurations work from a wheel, outside the clone."""
+"""Shipped configurations, and the parts of a page, work from a wheel, outside the clone."""
 
 import subprocess
 import sys
@@ -27,6 +27,8 @@ def test_wheel_holds_the_shipped_configurations(tmp_path):
         "import adv2e; assert adv2e.__file__.startswith(sys.argv[1]), adv2e.__file__\n"
         "from adv2e.config import load_family, shipped\n"
         "for name in shipped(): load_family([name])\n"
+        "from adv2e.events import make_events\n"
+        "assert '<canvas' in adv2e.view(make_events([1], [0], [0], [1]), size=(2, 2))\n"
         "print(*shipped())\n"
     )
     outcome = subprocess.run(

@@ -33,9 +33,9 @@ from adv2e.errors import DataError
 from adv2e.events import Events, cut, empty_events
 from adv2e.files.regular import shown
 from adv2e.files.states import check_distinct
-from adv2e.formats.reading import events_in_order, open_events, shots_of
+from adv2e.formats.reading import events_in_order, open_events, read_events, shots_of
 from adv2e.formats.recording import Recording
-from adv2e.geometry import MOST_PIXELS, Size
+from adv2e.geometry import MOST_PIXELS
 from adv2e.light.pictures import drawn_frame
 from adv2e.options import ViewOptions, takes
 from adv2e.process.bars import share_bar
@@ -142,10 +142,7 @@ def _opened(
     size, _, parts = events_in_order(file)
     facts, shots = file.facts, list(shots_of(file))
     if size[0] * size[1] > MOST_PIXELS:
-        raise DataError(
-            f"{path}: a sensor of {Size(*size)} pixels, over {MOST_PIXELS:,}: if one event is"
-            " wrong, state the size: --size WxH"
-        )
+        read_events(path, **reading)  # which names the event that needs so many
     ends, times_ns = empty_events(2), np.array([shot.t_ns for shot in shots], np.int64)
     ends["t"] = facts.span_us or 0
     recording = Recording(
@@ -206,8 +203,9 @@ def _page(
         [at_us - origin_us, f"data:image/webp;base64,{b64encode(data).decode()}"]
         for at_us, data in frames
     ]
-    told = f"{recording.width} × {recording.height} pixels · {(stop_us - begin_us) / 1e6:,.6g} s"
-    told += f" · {thinned.count:,} events ({on.sum():,} ON, {off.sum():,} OFF) · "
+    lasts_s = f"{(stop_us - begin_us) / 1e6:,.6f}".rstrip("0").rstrip(".")
+    told = f"{recording.width} × {recording.height} pixels · {lasts_s} s · {thinned.count:,} event"
+    told += f"{'s' * (thinned.count != 1)} ({on.sum():,} ON, {off.sum():,} OFF) · "
     told += f"{len(frames):,} of {of_frames:,} frames · " if of_frames else ""
     doubts = "".join(f"<li>{html.escape(shown(one))}</li>" for one in recording.problems)
     fields = {name: (_DATA / f"view.{name}").read_text("utf-8") for name in ("css", "js", "html")}

@@ -312,12 +312,6 @@ def test_wrong_command_lines(tmp_path, adv2e, monkeypatch, options, text):
     assert [path.name for path in tmp_path.iterdir()] == ["e.h5"]
 
 
-def test_a_stray_coordinate_is_one_clear_line(tmp_path):
-    (tmp_path / "e.txt").write_text("0.1 60000 60000 1\n0.2 3 4 0\n")
-    with pytest.raises(DataError, match="a sensor of 60001x60001 pixels, over 33,554,432"):
-        view(tmp_path / "e.txt")
-
-
 def test_what_cannot_be_in_python(tmp_path):
     with pytest.raises(UsageError, match="an array of events needs"):
         view(random_events(3))

@@ -134,7 +134,7 @@ let events = { count: 0 };
 function usual() {
   // long enough for some thousand events that are drawn, short enough to play
   const some = (whole / Math.max(1, facts.drawn)) * 2000;
-  const wanted = Math.min(Math.max(2e4, some), 2e5, whole / 5);
+  const wanted = Math.min(Math.max(2e4, some), 1e6, whole / 5);
   state.window = Math.max(0, WINDOWS.filter((one) => one <= wanted).length - 1);
   const slow = SPEEDS.filter((speed) => speed <= 1 && whole / speed >= 8e6);
   state.speed = Math.max(0, slow.length - 1);
@@ -263,9 +263,15 @@ function drawPlane() {
   const pixels = new Uint32Array(image.data.buffer);
   const inks = [pixelOf(off), pixelOf(on)];
   const { x, y, p } = events;
-  const stop = before(state.at);
-  for (let n = before(state.at - currentWindow()); n < stop; n++) {
-    pixels[Math.floor(y[n] / cell) * columns + Math.floor(x[n] / cell)] = inks[p[n]];
+  const [first, stop] = [before(state.at - currentWindow()), before(state.at)];
+  // a few events of many small pixels would hardly be seen
+  const large = stop - first < 3000 && canvas.clientWidth < 1.5 * columns ? 2 : 1;
+  for (let n = first; n < stop; n++) {
+    const [row, column] = [Math.floor(y[n] / cell), Math.floor(x[n] / cell)];
+    for (let line = row; line < Math.min(rows, row + large); line++) {
+      const place = line * columns + column;
+      pixels.fill(inks[p[n]], place, Math.min(place + large, (line + 1) * columns));
+    }
   }
   sheet.getContext("2d").putImageData(image, 0, 0);
   context.drawImage(sheet, 0, 0);
@@ -403,7 +409,7 @@ function drawRate() {
   context.fillRect(0, zero, columns, dot / 2);
   context.globalAlpha = 1;
   ticks(columns / dot / 110).forEach((us) => {
-    const text = `${+(us / 1e6).toPrecision(9)} s`;
+    const text = `${us / 1e6} s`;
     const half = context.measureText(text).width / 2;
     context.fillRect(across(us), rows - foot, dot, 4 * dot);
     context.textAlign = "center";
@@ -428,7 +434,7 @@ function drawRate() {
 
 // Return round times, about so many.
 function ticks(many) {
-  const least = whole / Math.max(1, many);
+  const least = Math.max(1, whole / Math.max(1, many));
   const power = 10 ** Math.floor(Math.log10(least));
   const apart = power * [1, 2, 5, 10].find((digit) => power * digit >= least);
   const found = [];
