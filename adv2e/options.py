@@ -667,9 +667,8 @@ class RenderOptions(RenderedPart, EventInput, total=False):
     window_ms: Annotated[
         "float | None",
         Option(
-            help="A picture shows the events of the last MS milliseconds.",
-            usual="in a film, those since the picture before; on a sheet 20; of rate, whose bins"
-            " are as long, a 300th",
+            help="A picture shows the events of the last MS milliseconds; a bin of rate is as long.",
+            usual="in a film, those since the picture before; on a sheet 20; of rate a round part",
             flags=("--window",),
             kind="positive",
             metavar="MS",

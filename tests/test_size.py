@@ -36,7 +36,7 @@ LIMITS = {
     "motion": 370,
     "pixel": 575,
     "process": 265,
-    "rendering": 1045,
+    "rendering": 1036,
     "reports": 1773,
     "representations": 145,
     "side": 845,

@@ -91,14 +91,14 @@ def rate_picture(rates: Rates, origin_us: int, style: Style, scale: int = 1) -> 
     picture = np.full((rows * scale, columns * scale, 3), _PAPER, np.uint8)
     seconds = (rates.edges_us - origin_us) * 1e-6
     off, on = rates.per_second
-    top = max(float((on + off).max()) * 1.05, 1e-9)
+    top = float((on + off).max()) * 1.05 or 1.0
     unit, words = next((one for one in _UNITS if top >= one[0]), (1.0, "events a second"))
     bottom, right = rows - _BOTTOM, columns - _RIGHT
     x = _LEFT + (right - _LEFT) * (seconds - seconds[0]) / (seconds[-1] - seconds[0])
 
-    def across(points: Sequence[tuple[float, float]], colour: Colour, width: int) -> None:
+    def across(points: Sequence[tuple[float, float]], colour: Colour) -> None:
         corners = np.rint(np.array(points) * scale * 16).astype(np.int32)
-        cv2.polylines(picture, [corners], False, colour, width * scale, cv2.LINE_AA, 4)
+        cv2.polylines(picture, [corners], False, colour, scale, cv2.LINE_AA, 4)
 
     def write(text: str, x: float, y: float, anchor: float = 0.0, colour: Colour = _INK) -> float:
         (length, _), _ = cv2.getTextSize(text, FONT, 0.42 * scale, scale)
@@ -109,12 +109,12 @@ def rate_picture(rates: Rates, origin_us: int, style: Style, scale: int = 1) -> 
     ticks = linear_ticks(0.0, top / unit, 5)
     for tick, label in zip(ticks, tick_labels(ticks), strict=True):
         y = bottom - (bottom - _TOP) * tick * unit / top
-        across([(_LEFT, y), (right, y)], _INK if tick == 0 else _LINE, 1)
+        across([(_LEFT, y), (right, y)], _INK if tick == 0 else _LINE)
         write(label, _LEFT - 6, y + 4, 1.0)
     ticks = linear_ticks(float(seconds[0]), float(seconds[-1]), 8)
     for tick, label in zip(ticks, tick_labels(ticks), strict=True):
         at = _LEFT + (right - _LEFT) * (tick - seconds[0]) / (seconds[-1] - seconds[0])
-        across([(at, bottom), (at, bottom + 4)], _INK, 1)
+        across([(at, bottom), (at, bottom + 4)], _INK)
         write(label, at, bottom + 18, 0.5)
     write("time [s]", (_LEFT + right) / 2, rows - 14, 0.5)
     write(f"{words}, in bins of {rates.width_us / 1e3:g} ms", GAP, 18)
@@ -123,7 +123,7 @@ def rate_picture(rates: Rates, origin_us: int, style: Style, scale: int = 1) -> 
         ("ON and OFF", "ON", "OFF"), (_INK, style.on, style.off), (on + off, on, off), strict=True
     ):
         steps = bottom - (bottom - _TOP) * np.repeat(value, 2) / top
-        across(list(zip(np.repeat(x, 2)[1:-1], steps, strict=True)), colour, 1)
+        across(list(zip(np.repeat(x, 2)[1:-1], steps, strict=True)), colour)
         after -= write(name, after, 18, 1.0, colour) - after + 2 * GAP
     return picture
 

@@ -17,14 +17,7 @@ from adv2e.files.states import check_distinct
 from adv2e.light.pictures import drawn_frame
 from adv2e.options import FilmOptions, RenderedPart, chosen, takes
 from adv2e.process import bars
-from adv2e.rendering.films import (
-    Film,
-    PictureOutput,
-    Sheet,
-    check_suffix,
-    replacing,
-    write_png,
-)
+from adv2e.rendering.films import Film, PictureOutput, Sheet, check_suffix, replacing, write_png
 from adv2e.rendering.rate import Rates, rate_picture
 from adv2e.rendering.styles import RATE, Style
 from adv2e.rendering.timeline import Caption, Timeline, caption

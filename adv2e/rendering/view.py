@@ -161,25 +161,27 @@ class Thinned:
     """
 
     def __init__(self) -> None:
-        self.every, self.count = 1, 0
-        self.events, self._ranks = empty_events(), np.empty(0, np.uint32)
+        self.every, self.count, self._held = 1, 0, 0
+        self._parts = [(empty_events(), np.empty(0, np.uint32))]
 
     def add(self, events: Events) -> None:
         """Take events that follow those before."""
         ranks = np.arange(self.count, self.count + events.size, dtype=np.uint64).astype(np.uint32)
         self.count += events.size
-        ranks *= np.uint32(0x9E3779B9)  # 2**32 over the golden ratio
-        kept = ranks <= 0xFFFFFFFF // self.every
-        self.events = np.concatenate([self.events, without_causes(events)[kept]])
-        self._ranks = np.concatenate([self._ranks, ranks[kept]])
-        if self.events.size > 2 * _MOST_DRAWN:
+        self._keep(without_causes(events), ranks * np.uint32(0x9E3779B9))  # 2**32 / golden ratio
+        if self._held > 2 * _MOST_DRAWN:
             self.thin(2 * self.every)
 
-    def thin(self, every: int) -> None:
-        """Keep about one of `every`, which are at least as many as before."""
-        self.every = every
-        kept = self._ranks <= 0xFFFFFFFF // every
-        self.events, self._ranks = self.events[kept], self._ranks[kept]
+    def thin(self, every: int) -> Events:
+        """Return the events of which one in `every` is left, no more of them than before."""
+        parts, self._parts, self._held, self.every = self._parts, [], 0, every
+        self._keep(*map(np.concatenate, zip(*parts, strict=True)))
+        return self._parts[0][0]
+
+    def _keep(self, events: Events, ranks: NDArray[np.uint32]) -> None:
+        kept = ranks <= 0xFFFFFFFF // self.every
+        self._parts.append((events[kept], ranks[kept]))
+        self._held += self._parts[-1][1].size
 
 
 def _page(
@@ -212,17 +214,16 @@ def _page(
     fields["title"] = html.escape(shown(Path(recording.path).name or recording.path))
     fields |= {"problems": _DOUBTS.format(doubts) if doubts else "", "version": __version__}
 
-    def filled() -> str:
-        every = thinned.every
-        text = json.dumps({**facts, "drawn": thinned.events.size, "every": every})
+    def filled(every: int) -> str:
+        drawn = thinned.thin(every)
         fields["told"] = told + (f"1 of {every:,}" if every > 1 else "all") + " events drawn"
-        fields["facts"] = text.replace("<", "\\u003c")
-        fields["events"] = b64encode(packed(thinned.events, begin_us)).decode()
+        fields["facts"] = json.dumps({**facts, "drawn": drawn.size, "every": every})
+        fields["events"] = b64encode(packed(drawn, begin_us)).decode()
         return re.sub(r"\{\{(\w+)\}\}", lambda found: fields[found[1]], fields["html"])
 
-    thinned.thin(max(thinned.every, -(-thinned.count // _MOST_DRAWN)))
-    while (size := len((page := filled()).encode())) > MOST_BYTES:
-        thinned.thin(max(thinned.every + 1, thinned.every * size // MOST_BYTES))
+    every = max(thinned.every, -(-thinned.count // _MOST_DRAWN))
+    while (size := len((page := filled(every)).encode())) > MOST_BYTES:
+        every = max(every + 1, every * size // MOST_BYTES)
     return page
 
 

@@ -128,7 +128,7 @@ for (let power = 10; power < Math.max(1e4, whole); power *= 10) {
   WINDOWS.push(power, 2 * power, 5 * power);
 }
 
-const state = { at: facts.begin, playing: false, show: "both", frames: true, ...TURNED };
+const state = { at: facts.begin, playing: false, show: "both", frames: 1, ...TURNED };
 let events = { count: 0 };
 
 function usual() {
@@ -147,8 +147,10 @@ function usual() {
 // ---- Numbers as people read them.
 
 const grouped = (value) => Math.round(value).toLocaleString("en-US");
-const seconds = (us, digits = 6) => `${(us / 1e6).toFixed(digits)} s`;
-const digitsOfTime = () => Math.min(6, Math.max(3, 7 - Math.floor(Math.log10(currentWindow()))));
+const told = (us) => { // with digits enough for the window
+  const digits = Math.min(6, Math.max(3, 7 - Math.floor(Math.log10(currentWindow()))));
+  return `${(us / 1e6).toFixed(digits)} s`;
+};
 
 function length(us) {
   if (us >= 1e6) return `${us / 1e6} s`;
@@ -196,10 +198,7 @@ function play() {
   changed();
 }
 
-function pause() {
-  state.playing = false;
-  changed();
-}
+const pause = () => { state.playing = false; changed(); };
 
 // ---- Drawing: once for all that changed.
 
@@ -230,11 +229,15 @@ const pixelOf = (colour) => { // as in the memory of an image; all machines of b
   const [red, green, blue] = rgb(colour);
   return ((255 << 24) | (blue << 16) | (green << 8) | red) >>> 0;
 };
-const palette = () => {
+
+function opened(id) {
+  const canvas = $(id);
   const [, ground, on, off] = COLOURS[state.colours];
-  const light = rgb(ground).reduce((sum, one) => sum + one) > 380;
-  return { ground, on, off, ink: light ? "#333333" : "#d8d8d8" };
-};
+  const ink = rgb(ground).reduce((sum, one) => sum + one) > 380 ? "#333333" : "#d8d8d8";
+  const inks = [pixelOf(off), pixelOf(on)];
+  const [columns, rows, context] = [canvas.width, canvas.height, canvas.getContext("2d")];
+  return { canvas, context, columns, rows, ground, on, off, ink, inks, dot: devicePixelRatio };
+}
 
 // On the sensor, each pixel has the colour of its last event. Where a pixel of the screen shows
 // several of the sensor, it is the last of all of them, so that none is lost.
@@ -248,10 +251,7 @@ const pictures = facts.frames.map(([at, source]) => {
 });
 
 function drawPlane() {
-  const canvas = $("plane");
-  const context = canvas.getContext("2d");
-  const { ground, on, off } = palette();
-  const [columns, rows] = [canvas.width, canvas.height];
+  const { canvas, context, columns, rows, ground, inks } = opened("plane");
   [sheet.width, sheet.height] = [columns, rows];
   context.fillStyle = ground;
   context.fillRect(0, 0, columns, rows);
@@ -261,7 +261,6 @@ function drawPlane() {
   }
   const image = context.createImageData(columns, rows);
   const pixels = new Uint32Array(image.data.buffer);
-  const inks = [pixelOf(off), pixelOf(on)];
   const { x, y, p } = events;
   const [first, stop] = [before(state.at - currentWindow()), before(state.at)];
   // a few events of many small pixels would hardly be seen
@@ -298,18 +297,14 @@ function projection(canvas) {
 }
 
 function drawCloud() {
-  const canvas = $("cloud");
-  const context = canvas.getContext("2d");
-  const { ground, on, off, ink } = palette();
+  const { canvas, context, columns, rows, ground, inks, dot } = opened("cloud");
   const depth = currentDepth();
   const from = DEPTHS[state.depth] ? state.at - depth : facts.begin;
   const { place, newestInFront } = projection(canvas);
-  const [columns, rows] = [canvas.width, canvas.height];
   const image = context.createImageData(columns, rows);
   const pixels = new Uint32Array(image.data.buffer).fill(pixelOf(ground));
-  const inks = [pixelOf(off), pixelOf(on)];
   const [begin, stop] = [before(from), before(from + depth)];
-  const large = Math.round(devicePixelRatio) + (stop - begin < 20000 ? 1 : 0);
+  const large = Math.round(dot) + (stop - begin < 20000 ? 1 : 0);
   const [left, top] = place(0.5, 0.5, 0).map((one) => one - large / 2);
   const [later, right, down] = [place(0.5, 0.5, 1), place(1.5, 0.5, 0), place(0.5, 1.5, 0)].map(
     (one) => [one[0] - large / 2 - left, one[1] - large / 2 - top],
@@ -327,11 +322,12 @@ function drawCloud() {
     }
   }
   context.putImageData(image, 0, 0);
-  drawBox(context, place, { from, depth, ink });
+  drawBox(place, from, depth);
 }
 
-function drawBox(context, place, { from, depth, ink }) {
+function drawBox(place, from, depth) {
   const { width, height } = facts;
+  const { context, columns, ink, dot } = opened("cloud");
   const corners = (share) => [[0, 0], [width, 0], [width, height], [0, height]]
     .map(([x, y]) => place(x, y, share));
   const around = (points) => {
@@ -340,17 +336,13 @@ function drawBox(context, place, { from, depth, ink }) {
     context.closePath();
     context.stroke();
   };
-  const dot = devicePixelRatio;
   context.strokeStyle = context.fillStyle = ink;
-  context.lineWidth = dot;
-  context.globalAlpha = 0.35;
+  [context.lineWidth, context.globalAlpha] = [dot, 0.35];
   const [first, last] = [corners(0), corners(1)];
-  around(first);
-  around(last);
+  [first, last].forEach(around);
   first.forEach((corner, n) => around([corner, last[n]]));
-  context.globalAlpha = 0.9;
   const share = (us) => Math.max(0, Math.min(1, (us - from) / depth));
-  context.lineWidth = 1.5 * dot;
+  [context.lineWidth, context.globalAlpha] = [1.5 * dot, 0.9];
   around(corners(share(state.at)));
   context.lineWidth = dot;
   around(corners(share(state.at - currentWindow())));
@@ -360,19 +352,14 @@ function drawBox(context, place, { from, depth, ink }) {
     const far = Math.hypot(x - awayX, y - awayY) || 1;
     const out = 15 * dot;
     const half = context.measureText(text).width / 2 + 2 * dot;
-    const across = x + ((x - awayX) / far) * out;
-    context.fillText(
-      text,
-      Math.max(half, Math.min(context.canvas.width - half, across)),
-      y + ((y - awayY) / far) * out + 4 * dot,
-    );
+    const across = Math.max(half, Math.min(columns - half, x + ((x - awayX) / far) * out));
+    context.fillText(text, across, y + ((y - awayY) / far) * out + 4 * dot);
   };
   const middle = place(width / 2, height / 2, 0.5);
   write("x", place(width / 2, height, 1), middle);
   write("y", place(width, height / 2, 1), middle);
-  const digits = digitsOfTime();
-  write(seconds(from, digits), place(0, height, 0), middle);
-  write(seconds(from + depth, digits), place(0, height, 1), middle);
+  write(told(from), place(0, height, 0), middle);
+  write(told(from + depth), place(0, height, 1), middle);
 }
 
 // The rates over time [1/s]: ON upwards, OFF downwards.
@@ -383,11 +370,7 @@ const rates = (counts) => counts.map((count, n) => {
 const RATES = { on: rates(facts.on), off: rates(facts.off) };
 
 function drawRate() {
-  const canvas = $("rate");
-  const context = canvas.getContext("2d");
-  const dot = devicePixelRatio;
-  const { ground, on, off, ink } = palette();
-  const [columns, rows] = [canvas.width, canvas.height];
+  const { context, columns, rows, ground, on, off, ink, dot } = opened("rate");
   const across = (us) => ((us - facts.begin) / whole) * columns;
   const foot = 18 * dot;
   const [top, low] = [Math.max(...RATES.on), Math.max(...RATES.off)];
@@ -417,16 +400,12 @@ function drawRate() {
     context.fillText(text, x, rows - 4 * dot);
   });
   context.textAlign = "left";
-  const text = `ON up to ${short(top)}/s, OFF ${short(low)}/s`;
-  context.globalAlpha = 0.75;
-  context.fillStyle = ground;
-  context.fillRect(3 * dot, 3 * dot, context.measureText(text).width + 6 * dot, 15 * dot);
-  context.globalAlpha = 1;
-  context.fillStyle = ink;
-  context.fillText(text, 6 * dot, 14 * dot);
+  const text = [`ON up to ${short(top)}/s, OFF ${short(low)}/s`, 6 * dot, 14 * dot];
+  [context.strokeStyle, context.lineWidth] = [ground, 5 * dot];
+  context.strokeText(...text);
+  context.fillText(...text);
   const left = across(state.at - currentWindow());
   context.globalAlpha = 0.25;
-  context.fillStyle = ink;
   context.fillRect(left, 0, across(state.at) - left, rows);
   context.globalAlpha = 1;
   context.fillRect(Math.min(columns - 2 * dot, across(state.at) - dot), 0, 2 * dot, rows);
@@ -448,8 +427,7 @@ let pointed = null; // where the pointer is on the sensor
 function tell() {
   const [first, stop] = [before(state.at - currentWindow()), before(state.at)];
   const { x, y, p } = events;
-  const total = [0, 0];
-  const here = [0, 0];
+  const [total, here] = [[0, 0], [0, 0]];
   for (let n = first; n < stop; n++) {
     total[p[n]]++;
     const [column, row] = [Math.floor(x[n] / cell), Math.floor(y[n] / cell)];
@@ -464,12 +442,11 @@ function tell() {
   }
   if (!facts.drawn) text = "There are no events here.";
   $("counts").textContent = text;
-  $("time").textContent = seconds(state.at, digitsOfTime());
+  $("time").textContent = told(state.at);
   $("play").textContent = state.playing ? "Pause" : "Play";
   $("play").setAttribute("aria-pressed", state.playing);
-  const rate = $("rate");
-  rate.setAttribute("aria-valuenow", state.at / 1e6);
-  rate.setAttribute("aria-valuetext", `${seconds(state.at, 3)}, ${text}`);
+  $("rate").setAttribute("aria-valuenow", state.at / 1e6);
+  $("rate").setAttribute("aria-valuetext", `${told(state.at)}, ${text}`);
   $("window").value = state.window;
   $("window").setAttribute("aria-valuetext", window);
   $("window-told").textContent = window;
@@ -481,10 +458,10 @@ function showTip(us, x) {
   const tip = $("tip");
   const bin = Math.min(facts.on.length - 1, Math.floor((us - facts.begin) / facts.bin));
   const [on, off] = [RATES.on[bin], RATES.off[bin]];
-  tip.textContent = `${seconds(us, digitsOfTime())} · ON ${short(on)}/s, OFF ${short(off)}/s`;
+  tip.textContent = `${told(us)} · ON ${short(on)}/s, OFF ${short(off)}/s`;
   tip.hidden = false;
-  const most = $("strip").clientWidth - tip.offsetWidth;
-  tip.style.left = `${Math.max(0, Math.min(most, x - tip.offsetWidth / 2))}px`;
+  const left = Math.min($("strip").clientWidth - tip.offsetWidth, x - tip.offsetWidth / 2);
+  tip.style.left = `${Math.max(0, left)}px`;
 }
 
 // ---- The size of the pictures: as large as the page has room.
@@ -495,22 +472,18 @@ function layout() {
   const both = state.show === "both" && getComputedStyle(stage).gridTemplateColumns.includes(" ");
   const room = Math.max(80, (stage.clientWidth - (both ? 12 : 0)) / (both ? 2 : 1));
   const { width, height } = facts;
-  const stacked = state.show === "both" && !both;
   // what is below the pictures is to be seen with them
-  const most = Math.max(200, innerHeight - 265) * (stacked ? 0.62 : 1);
+  const most = Math.max(200, innerHeight - 265) * (state.show === "both" && !both ? 0.62 : 1);
   const scale = Math.min(room / width, most / height);
-  const plane = $("plane");
-  const dot = devicePixelRatio;
+  const [plane, cloud, rate, dot] = [$("plane"), $("cloud"), $("rate"), devicePixelRatio];
   cell = Math.max(1, Math.ceil(1 / (scale * dot) - 0.01));
   [plane.width, plane.height] = [Math.ceil(width / cell), Math.ceil(height / cell)];
   plane.style.width = `${plane.width * cell * scale}px`;
   plane.style.height = `${plane.height * cell * scale}px`;
-  const cloud = $("cloud");
   const tall = both ? Math.max(height * scale, room / 2) : Math.min(most, room * 0.8);
   [cloud.width, cloud.height] = [Math.round(room * dot), Math.round(tall * dot)];
   cloud.style.width = `${room}px`;
   cloud.style.height = `${tall}px`;
-  const rate = $("rate");
   [rate.width, rate.height] = [rate.clientWidth * dot, rate.clientHeight * dot].map(Math.round);
   changed();
 }
@@ -522,10 +495,7 @@ function choose(name, number, values) {
   changed();
 }
 
-function show(name) {
-  state.show = name;
-  layout();
-}
+const show = (name) => { state.show = name; layout(); };
 
 function fill(id, texts, values) {
   texts.forEach((text, n) => $(id).add(new Option(text, n)));
@@ -546,7 +516,7 @@ function controls() {
   $("window").oninput = () => choose("window", +$("window").value, WINDOWS);
   $("show").onchange = () => show($("show").value);
   $("frames-label").hidden = !pictures.length;
-  $("frames").onchange = () => { state.frames = $("frames").checked; changed(); };
+  $("frames").onchange = () => choose("frames", +$("frames").checked, [0, 1]);
   $("play").onclick = () => (state.playing ? pause() : play());
   $("first").onclick = () => go(facts.begin);
   $("back").onclick = () => step(-1);
@@ -564,23 +534,16 @@ function controls() {
 
 function pointers() {
   const rate = $("rate");
-  const timeAt = (event) => {
-    const box = rate.getBoundingClientRect();
-    const share = (event.clientX - box.left) / box.width;
-    return facts.begin + Math.max(0, Math.min(1, share)) * whole;
-  };
   const scrub = (event) => {
-    const us = timeAt(event);
+    const box = rate.getBoundingClientRect();
+    const share = Math.max(0, Math.min(1, (event.clientX - box.left) / box.width));
     if (event.buttons) {
       pause();
-      go(us);
+      go(facts.begin + share * whole);
     }
-    showTip(us, event.clientX - rate.getBoundingClientRect().left);
+    showTip(facts.begin + share * whole, share * box.width);
   };
-  rate.onpointerdown = (event) => {
-    rate.setPointerCapture(event.pointerId);
-    scrub(event);
-  };
+  rate.onpointerdown = (event) => { rate.setPointerCapture(event.pointerId); scrub(event); };
   rate.onpointermove = scrub;
   rate.onpointerleave = rate.onpointercancel = () => { $("tip").hidden = true; };
   rate.onpointerup = (event) => { if (event.pointerType !== "mouse") $("tip").hidden = true; };
@@ -623,7 +586,7 @@ const KEYS = [ // what is pressed, what the list on the page says of it, and wha
   ["[", "shorter window", () => choose("window", state.window - 1, WINDOWS)],
   ["]", "longer window", () => choose("window", state.window + 1, WINDOWS)],
   ["c", "other colours", () => choose("colours", (state.colours + 1) % COLOURS.length, COLOURS)],
-  ["f", "frames beneath the events", () => { state.frames = !state.frames; changed(); }],
+  ["f", "frames beneath the events", () => choose("frames", 1 - state.frames, [0, 1])],
   ["v", "sensor, x-y-time, or both", () => show(SHOWN[(SHOWN.indexOf(state.show) + 1) % 3])],
   ["t", "depth: how much time the x-y-time view holds",
     () => choose("depth", (state.depth + 1) % DEPTHS.length, DEPTHS)],
