@@ -667,7 +667,7 @@ class RenderOptions(RenderedPart, EventInput, total=False):
     window_ms: Annotated[
         "float | None",
         Option(
-            help="A picture shows the events of the last MS milliseconds; a bin of rate is as long.",
+            help="A picture shows the events of the last MS milliseconds; rate has bins of MS.",
             usual="in a film, those since the picture before; on a sheet 20; of rate a round part",
             flags=("--window",),
             kind="positive",
