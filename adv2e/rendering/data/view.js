@@ -133,8 +133,9 @@ let events = { count: 0 };
 
 function usual() {
   // long enough for some thousand events that are drawn, short enough to play
-  const some = (whole / Math.max(1, facts.drawn)) * 2000;
-  const wanted = Math.min(Math.max(2e4, some), 1e6, whole / 5);
+  const many = Math.min(2000, (facts.width * facts.height) / 20);
+  const some = (whole / Math.max(1, facts.drawn)) * many;
+  const wanted = Math.min(Math.max(Math.min(2e4, 5 * some), some), 1e6, whole / 5);
   state.window = Math.max(0, WINDOWS.filter((one) => one <= wanted).length - 1);
   const slow = SPEEDS.filter((speed) => speed <= 1 && whole / speed >= 8e6);
   state.speed = Math.max(0, slow.length - 1);
@@ -372,10 +373,10 @@ const RATES = { on: rates(facts.on), off: rates(facts.off) };
 function drawRate() {
   const { context, columns, rows, ground, on, off, ink, dot } = opened("rate");
   const across = (us) => ((us - facts.begin) / whole) * columns;
-  const foot = 18 * dot;
+  const [head, foot] = [17 * dot, 18 * dot];
   const [top, low] = [Math.max(...RATES.on), Math.max(...RATES.off)];
-  const each = (rows - foot - 4 * dot) / Math.max(1e-9, top + low);
-  const zero = 2 * dot + each * top;
+  const each = (rows - foot - head - 2 * dot) / Math.max(1e-9, top + low);
+  const zero = head + each * top;
   context.fillStyle = ground;
   context.fillRect(0, 0, columns, rows);
   for (const [name, colour, sign] of [["on", on, -1], ["off", off, 1]]) {
@@ -400,10 +401,7 @@ function drawRate() {
     context.fillText(text, x, rows - 4 * dot);
   });
   context.textAlign = "left";
-  const text = [`ON up to ${short(top)}/s, OFF ${short(low)}/s`, 6 * dot, 14 * dot];
-  [context.strokeStyle, context.lineWidth] = [ground, 5 * dot];
-  context.strokeText(...text);
-  context.fillText(...text);
+  context.fillText(`ON up to ${short(top)}/s, OFF ${short(low)}/s`, 6 * dot, 12 * dot);
   const left = across(state.at - currentWindow());
   context.globalAlpha = 0.25;
   context.fillRect(left, 0, across(state.at) - left, rows);
@@ -473,7 +471,7 @@ function layout() {
   const room = Math.max(80, (stage.clientWidth - (both ? 12 : 0)) / (both ? 2 : 1));
   const { width, height } = facts;
   // what is below the pictures is to be seen with them
-  const most = Math.max(200, innerHeight - 265) * (state.show === "both" && !both ? 0.62 : 1);
+  const most = Math.max(200, innerHeight - 280) * (state.show === "both" && !both ? 0.62 : 1);
   const scale = Math.min(room / width, most / height);
   const [plane, cloud, rate, dot] = [$("plane"), $("cloud"), $("rate"), devicePixelRatio];
   cell = Math.max(1, Math.ceil(1 / (scale * dot) - 0.01));
