@@ -8,6 +8,7 @@ read_events   a file of events -> Recording (events, sensor size, frames if ther
 write_events  events -> a file
 voxel_grid    events -> (bins, rows, columns), as networks take them
 render        events -> pictures and films
+view          events -> a page on which to play them in a browser
 export        events -> training sets and voxel grids in a folder
 batch         every sequence below a folder -> the same tree of events
 compare       two recordings -> how far one is from the other
@@ -61,6 +62,7 @@ __all__ = [
     "read_events",
     "render",
     "simulate",
+    "view",
     "voxel_grid",
     "write_events",
 ]
@@ -89,6 +91,7 @@ if TYPE_CHECKING:
     from adv2e.formats.writing import write_events
     from adv2e.inspection.inspect import info
     from adv2e.rendering.render import render
+    from adv2e.rendering.view import view
     from adv2e.representations.voxel_grid import voxel_grid
 
 _HOMES = {
@@ -112,6 +115,7 @@ _HOMES = {
     "read_events": "adv2e.formats.reading",
     "render": "adv2e.rendering.render",
     "simulate": "adv2e.conversion.simulation",
+    "view": "adv2e.rendering.view",
     "voxel_grid": "adv2e.representations.voxel_grid",
     "write_events": "adv2e.formats.writing",
 }

@@ -18,7 +18,7 @@ import math
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from numbers import Real
 from typing import (
@@ -637,21 +637,25 @@ class RenderedPart(FilmOptions, total=False):
     progress: Progress
 
 
-StyleName = Annotated[
-    str,
-    Option(
-        help="white, black: coloured events on that ground. grey: the net count of events, as"
-        " v2e draws it. surface: colours that fade with age.",
-        default="white",
-        choices=("white", "black", "grey", "surface"),
-    ),
-]
+_STYLE = Option(
+    help="white, black: coloured events on that ground. grey: the net count of events, as v2e"
+    " draws it. surface: colours that fade with age.",
+    default="white",
+    choices=("white", "black", "grey", "surface"),
+)
 
 
 class RenderOptions(RenderedPart, EventInput, total=False):
     """Options of pictures and films of events."""
 
-    style: StyleName
+    style: Annotated[
+        str,
+        replace(
+            _STYLE,
+            help=f"{_STYLE.help} rate: events a second over time, a .png.",
+            choices=(*_STYLE.choices, "rate"),
+        ),
+    ]
     on_color: Annotated[
         str,
         Option(help="Colour of ON events: a name or #rrggbb.", default="red", metavar="COLOR"),
@@ -663,13 +667,21 @@ class RenderOptions(RenderedPart, EventInput, total=False):
     window_ms: Annotated[
         "float | None",
         Option(
-            help="A picture shows the events of the last MS milliseconds.",
-            usual="in a film, those since the picture before; on a sheet 20",
+            help="A picture shows the events of the last MS milliseconds; rate has bins of MS.",
+            usual="in a film, those since the picture before; on a sheet 20; of rate a round part",
             flags=("--window",),
             kind="positive",
             metavar="MS",
         ),
     ]
+
+
+class ViewOptions(EventInput, total=False):
+    """Options of a page on which to look at events."""
+
+    no_frames: Annotated[bool, Option(help="Leave out the frames beneath.", default=False)]
+    overwrite: Overwrite
+    progress: Progress
 
 
 WindowUs = Annotated[
@@ -825,7 +837,7 @@ class SurfaceOptions(WindowOptions, total=False):
 class PictureOptions(WindowOptions, total=False):
     """Options of an export of pictures of events."""
 
-    style: StyleName
+    style: Annotated[str, _STYLE]
 
 
 class RvtOptions(TypedDict, total=False):

@@ -18,9 +18,9 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1670,
+    "": 1680,
     "batches": 1515,
-    "cli": 1235,
+    "cli": 1256,
     "comparison": 1165,
     "compilation": 285,
     "config": 1315,
@@ -36,8 +36,8 @@ LIMITS = {
     "motion": 370,
     "pixel": 575,
     "process": 265,
-    "rendering": 740,
-    "reports": 1791,
+    "rendering": 1036,
+    "reports": 1773,
     "representations": 145,
     "side": 860,
     "sources": 3695,
@@ -45,7 +45,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 340
+FILES = 343
 """Most modules of all packages together."""
 
 _SLACK = 60

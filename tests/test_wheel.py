@@ -32,6 +32,8 @@ def test_wheel_of_the_sources_holds_the_shipped_configurations(tmp_path):
         "import adv2e; assert adv2e.__file__.startswith(sys.argv[1]), adv2e.__file__\n"
         "from adv2e.config import load_family, shipped\n"
         "for name in shipped(): load_family([name])\n"
+        "from adv2e.events import make_events\n"
+        "assert '<canvas' in adv2e.view(make_events([1], [0], [0], [1]), size=(2, 2))\n"
         "print(*shipped())\n"
     )
     outcome = subprocess.run(

@@ -21,6 +21,7 @@ COMMANDS = {
     "batch": "Convert all videos or sequences below a folder.",
     "info": "Show what a video, a recording or an event file holds.",
     "render": "Make pictures and films of events.",
+    "view": "Make a page on which to play events in a browser.",
     "compare": "Measure how much two event streams differ.",
     "export": "Make training sets and representations of events.",
     "diagnose": "Find what a recording holds that its simulation lacks.",

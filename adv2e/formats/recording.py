@@ -118,6 +118,12 @@ class Recording:
 
         write_events(path, self, overwrite=overwrite)
 
+    def view(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write a page on which to play the events in a browser, as ``adv2e view`` does."""
+        from adv2e import view  # noqa: PLC0415 - which is above this module
+
+        view(self, path, overwrite=overwrite)
+
     def __repr__(self) -> str:
         frames = 0 if self.frame_times_ns is None else len(self.frame_times_ns)
         return (
@@ -127,21 +133,24 @@ class Recording:
         )
 
     def _repr_html_(self) -> str:
-        """Return the same for notebooks, with a picture of its events."""
+        """Return the same for notebooks, with pictures of its events and of their rate.
+
+        They are no scripts, which notebooks do not run before they are trusted.
+        """
         from base64 import b64encode  # noqa: PLC0415 - all these are for notebooks alone
         from html import escape  # noqa: PLC0415
-        from tempfile import TemporaryDirectory  # noqa: PLC0415
+
+        import cv2  # noqa: PLC0415
 
         from adv2e import render  # noqa: PLC0415 - which is above this module
 
-        text = f"<p>{escape(repr(self))}</p>"
-        if not (self.events.size and self.width and self.height):
-            return text
-        with TemporaryDirectory(prefix="adv2e-render-") as folder:
-            picture = Path(folder) / "events.png"
-            render(self, picture, count=1, frames=False)
-            data = b64encode(picture.read_bytes()).decode()
-        return f'{text}<img src="data:image/png;base64,{data}"/>'
+        parts = [f"<p>{escape(repr(self))}</p>"]
+        for style in ("white", "rate") if self.events.size and self.width and self.height else ():
+            picture: Any = render(self, count=1, frames=False, style=style)
+            data = b64encode(cv2.imencode(".png", picture[:, :, ::-1])[1].tobytes()).decode()
+            words = "events" if style == "white" else "rate of events over time"
+            parts.append(f'<img alt="{words}" src="data:image/png;base64,{data}"/>')
+        return "<br>".join(parts)
 
     @property
     def light(self) -> Light:

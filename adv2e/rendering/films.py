@@ -299,6 +299,14 @@ class Film:
         self._file.close()
 
 
+def write_png(path: Path, picture: Picture) -> None:
+    """Write a picture as PNG; NotWritten if it is too large for that."""
+    done, data = cv2.imencode(".png", picture[:, :, ::-1])
+    if not done:
+        raise NotWritten("a .png picture cannot be made of it")
+    path.write_bytes(data.tobytes())
+
+
 _KEPT = 4
 """Most cells that a sheet holds before the end, for each cell that it shows."""
 
@@ -331,11 +339,7 @@ class Sheet:
         cells = list(self._cells.values())
         shown = min(self._count, len(cells))
         places = [int((n + 0.5) * len(cells) / shown) for n in range(shown)]  # evenly spread
-        picture = sheet([cells[place] for place in places], self._style, self._scale)
-        done, data = cv2.imencode(".png", picture[:, :, ::-1])
-        if not done:
-            raise NotWritten("a .png picture cannot be made of it")
-        self._path.write_bytes(data.tobytes())
+        write_png(self._path, sheet([cells[place] for place in places], self._style, self._scale))
 
     def close(self) -> None:
         self._cells.clear()

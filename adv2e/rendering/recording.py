@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from adv2e.errors import DataError, OutputError
+from adv2e.events import cut
 from adv2e.files.staging import Staging
 from adv2e.files.states import check_distinct
 from adv2e.light.pictures import drawn_frame
 from adv2e.options import FilmOptions, RenderedPart, chosen, takes
 from adv2e.process import bars
-from adv2e.rendering.films import Film, PictureOutput, Sheet, check_suffix, replacing
-from adv2e.rendering.styles import Style
+from adv2e.rendering.films import Film, PictureOutput, Sheet, check_suffix, replacing, write_png
+from adv2e.rendering.rate import Rates, rate_picture
+from adv2e.rendering.styles import RATE, Style
 from adv2e.rendering.timeline import Caption, Timeline, caption
 from adv2e.ticks import microseconds
 
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 
 
 _CHUNK = 1 << 18  # events handed on at once where no frames divide them
+_RATE_BINS = 300
 
 
 @takes(RenderedPart)
@@ -59,23 +62,23 @@ def render_recording(
     OutputError, UsageError
         See :func:`open_preview`.
     """
-    start_s, stop_s, at_s = options["start_s"] or 0.0, options["stop_s"], options["at_s"]
-    most = options["max_pictures"]
+    at_s, most = options["at_s"], options["max_pictures"]
     check_distinct(path, recording.inputs)
     has_frames = recording.frame_times_ns is not None and recording.frame_times_ns.size > 0
     if not (len(recording) or has_frames):
         raise DataError(f"{recording.path}: holds no events and no frames")
     begin_us, last_us = recording.span_us
-    until_us = last_us + 1
-    lasts = f"{recording.path}: lasts {(until_us - begin_us) * 1e-6:.3f} s"
+    lasts = f"{recording.path}: lasts {(last_us + 1 - begin_us) * 1e-6:.3f} s"
     frames = frames and has_frames
     if not (recording.width and recording.height):
         raise DataError(f"{recording.path}: nothing tells how large the sensor is")
-    first_us = begin_us + round(start_s * 1e6)
-    if stop_s is not None:
-        until_us = min(until_us, begin_us + round(stop_s * 1e6))
-    if first_us >= until_us:
-        raise DataError(f"{lasts}, nothing is left from {start_s:g} s on")
+    first_us, until_us = part_shown(recording, options["start_s"], options["stop_s"])
+    if style is not None and style.name == RATE:
+        rates = Rates(first_us, until_us, _RATE_BINS, style.window_us)
+        rates.add(cut(recording.events, first_us, until_us))
+        with replacing(Path(path), options["overwrite"]) as unfinished:
+            write_png(unfinished, rate_picture(rates, begin_us, style, options["scale"] or 1))
+        return
     instants: list[int] = []
     if Path(path).suffix.lower() == ".png":
         instants = [begin_us + round(time * 1e6) for time in sorted(at_s)]
@@ -99,6 +102,22 @@ def render_recording(
         **chosen(FilmOptions, options),
     ) as preview:
         _feed(preview, recording, first_us, until_us, frames, options["progress"])
+
+
+def part_shown(
+    recording: Recording, start_s: float | None, stop_s: float | None
+) -> tuple[int, int]:
+    """Return when the part to show begins and ends, half open [us]; DataError if it is empty."""
+    begin_us, last_us = recording.span_us
+    first_us, until_us = begin_us + round((start_s or 0.0) * 1e6), last_us + 1
+    lasts_s = (until_us - begin_us) * 1e-6
+    if stop_s is not None:
+        until_us = min(until_us, begin_us + round(stop_s * 1e6))
+    if first_us >= until_us:
+        raise DataError(
+            f"{recording.path}: lasts {lasts_s:.3f} s, nothing is left from {start_s or 0:g} s on"
+        )
+    return first_us, until_us
 
 
 def _feed(

@@ -17,7 +17,7 @@ from adv2e.formats.reading import Recording, read_events
 from adv2e.options import EventInput, RenderedPart, RenderOptions, chosen, size_of, takes
 from adv2e.rendering.films import check_suffix
 from adv2e.rendering.recording import render_recording
-from adv2e.rendering.styles import Style, parse_colour
+from adv2e.rendering.styles import RATE, Style, parse_colour
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -80,7 +80,7 @@ def render(
         if path is None:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="adv2e-render-"))
             path = Path(folder) / "events.png"
-        recording = _recording(events, reading_of(options))
+        recording = recording_of(events, reading_of(options))
         render_recording(
             recording,
             path,
@@ -94,7 +94,7 @@ def render(
         return np.ascontiguousarray(picture[:, :, ::-1], np.uint8)
 
 
-def reading_of(options: RenderOptions) -> EventInput:
+def reading_of(options: EventInput) -> EventInput:
     """Return the options of the reading: a film shows the frame before its start, too."""
     return {**chosen(EventInput, options), "start_s": None, "stop_s": None}
 
@@ -106,16 +106,21 @@ def chosen_style(output: str | Path, options: RenderOptions) -> Style:
         raise UsageError(
             f"{output}: instants (--at) are for a .png; --start and --stop choose part of a film"
         )
+    is_rate = options["style"] == RATE
+    if is_rate and (is_film or options["at_s"]):
+        raise UsageError(f"{output}: --style rate makes one .png, of all the time: leave --at out")
     usual_ms = 1e3 * options["speed"] / options["fps"] if is_film else _SHEET_WINDOW_MS
+    usual_us = 0 if is_rate else max(1, round(1e3 * usual_ms))
+    window_ms = options["window_ms"]
     return Style(
         name=options["style"],
         on=parse_colour(options["on_color"]),
         off=parse_colour(options["off_color"]),
-        window_us=max(1, round(1e3 * (options["window_ms"] or usual_ms))),
+        window_us=usual_us if window_ms is None else max(1, round(1e3 * window_ms)),
     )
 
 
-def _recording(events: str | Path | Recording | NDArray[Any], reading: EventInput) -> Recording:
+def recording_of(events: str | Path | Recording | NDArray[Any], reading: EventInput) -> Recording:
     """Return the recording to draw; UsageError if options do not fit what it is made of."""
     if isinstance(events, (str, Path)):
         return read_events(events, **reading)

@@ -7,6 +7,7 @@ black    the same on black
 grey     (clip(ON - OFF, -3, 3) + 3)/6: brighter for more ON, mid-grey without events (as v2e)
 surface  time surface [1]_ on white: the colour of the last event, fading with its age as
          exp(-age/tau), tau a third of the window
+rate     events a second over the whole time, in bins of the window (:mod:`adv2e.rendering.rate`)
 ======== =========================================================================================
 
 References
@@ -50,9 +51,16 @@ GREY_CLIP = 3
 """Net count at which the grey style is black or white."""
 
 
+RATE = "rate"
+"""The style that is a picture of all events and not of a window."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Style:
-    """Style of pictures: a name of ``STYLES``, colours (RGB), and the window of events [us]."""
+    """Style of pictures: a name of ``STYLES``, colours (RGB), and the window of events [us].
+
+    Of ``RATE``, a window of 0 is as long as suits the picture.
+    """
 
     name: str = "white"
     on: Colour = COLOURS["red"]
@@ -60,9 +68,9 @@ class Style:
     window_us: int = 20_000
 
     def __post_init__(self) -> None:
-        if self.name not in STYLES:
-            raise UsageError(f"style '{self.name}': must be one of {', '.join(STYLES)}")
-        if self.window_us < 1:
+        if self.name not in (*STYLES, RATE):
+            raise UsageError(f"style '{self.name}': must be one of {', '.join([*STYLES, RATE])}")
+        if self.window_us < (self.name != RATE):
             raise UsageError(f"window {self.window_us} us: must be at least 1 us")
 
     @property
@@ -166,7 +174,9 @@ GAP = 8
 MOST_PIXELS = 1800
 """Width up to which a sheet is drawn unless told otherwise [pixels]."""
 
-_FONT, _SIZE = cv2.FONT_HERSHEY_SIMPLEX, 0.45
+FONT = cv2.FONT_HERSHEY_SIMPLEX
+
+_SIZE = 0.45
 
 
 @dataclass(frozen=True)
@@ -254,8 +264,8 @@ def _paper(style: Style) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
 def _write(picture: Picture, text: str, left: int, ink: tuple[int, int, int]) -> int:
     """Write `text` into the strip; return the column where it ends."""
     place = (left, STRIP - 9)
-    cv2.putText(picture, text, place, _FONT, _SIZE, ink, 1, cv2.LINE_AA)
-    return left + int(cv2.getTextSize(text, _FONT, _SIZE, 1)[0][0])
+    cv2.putText(picture, text, place, FONT, _SIZE, ink, 1, cv2.LINE_AA)
+    return left + int(cv2.getTextSize(text, FONT, _SIZE, 1)[0][0])
 
 
 def _legend(picture: Picture, style: Style, after: int, ink: tuple[int, int, int]) -> None:

@@ -105,7 +105,7 @@ class Timeline:
         if self._with_frames is not False:
             self._with_frames = True
             self._last_frame_us = t_us
-            self._frames.append(t_us, _reduced(image, self._size))
+            self._frames.append(t_us, reduced(image, self._size))
         self._draw_up_to(self._known_us())
 
     def add_events(self, events: Events) -> None:
@@ -218,7 +218,7 @@ class Timeline:
         return self._shown
 
 
-def _reduced(image: NDArray[Any], size: tuple[int, int]) -> Picture:
+def reduced(image: NDArray[Any], size: tuple[int, int]) -> Picture:
     """Return a frame in 8 bits and of `size` (width, height)."""
     image = eight_bit(image)
     if image.shape[1::-1] != size:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import base64
-import itertools
 import math
-import re
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from adv2e.rendering.rate import linear_ticks, tick_labels
 from adv2e.rendering.styles import COLOURS
 from adv2e.reports.markup import Markup, Wording, join, tag
 from adv2e.reports.quantities import estimate_text
@@ -272,21 +271,6 @@ def _percent(part: float, whole: float) -> str:
 # ---- Axes: from values to places in a picture, their ticks and labels, and how they are drawn.
 
 
-def linear_ticks(low: float, high: float, most: int = 6) -> list[float]:
-    """Return multiples of 1, 2 or 5 times a power of ten from `low` to `high`, ascending.
-
-    At most `most` of them, and one more; `low` is below `high` by more than rounding.
-    """
-    least = (high - low) / most
-    exponent = math.floor(math.log10(least))
-    digits = next(d for d in (1, 2, 5, 10) if float(f"{d}e{exponent}") >= least)
-    step = float(f"{digits}e{exponent}")
-    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-    # from decimal text, because multiples of a float such as 0.1 are off by its rounding
-    ticks = (float(f"{n * digits}e{exponent}") for n in range(first, last + 1))
-    return sorted({tick + 0.0 for tick in ticks if low <= tick <= high})
-
-
 def log_ticks(low: float, high: float, most: int = 7) -> list[float]:
     """Return ticks of a logarithmic axis: powers of ten, with 2 and 5 times those if few.
 
@@ -301,17 +285,6 @@ def log_ticks(low: float, high: float, most: int = 7) -> list[float]:
         if len(ticks) >= 3:
             return ticks
     return linear_ticks(low, high)
-
-
-def tick_labels(ticks: Sequence[float]) -> list[str]:
-    gap = min((b - a for a, b in itertools.pairwise(ticks)), default=0.0)
-    labels: list[str] = []
-    for digits in range(6, 18):
-        labels = [f"{tick:.{digits}g}" for tick in ticks]
-        pairs = zip(labels, ticks, strict=True)
-        if all(abs(float(label) - tick) <= 1e-6 * gap for label, tick in pairs):
-            break
-    return [re.sub(r"e\+?(-?)0*", r"e\1", label) for label in labels]
 
 
 Floats = NDArray[np.float64]

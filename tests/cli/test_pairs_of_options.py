@@ -93,7 +93,7 @@ def fits_convert(row):
 RENDER = {
     "input": ["frames.h5", "e.txt", "recording"],
     "output": ["a.mp4", "a.gif", "a.webm", "a.avi", "a.png"],
-    "style": [NO, ("--style", "black"), ("--style", "grey"), ("--style", "surface")],
+    "style": [NO, *(("--style", name) for name in ("black", "grey", "surface", "rate"))],
     "colours": [NO, ("--on-color", "#00ff00"), ("--off-color", "purple")],
     "window": [NO, ("--window", "5")],
     "speed": [NO, ("--speed", "0.5")],
@@ -113,11 +113,28 @@ RENDER = {
 
 def fits_render(row):
     film = row.get("output", "a.png") != "a.png"
-    if film and row.get("instants"):
+    instants = row.get("instants", NO)
+    if film and instants:
+        return False
+    if row.get("style") == ("--style", "rate") and (film or "--at" in instants):
         return False
     if "output" in row and not film and (row.get("rate") or row.get("speed") or row.get("most")):
         return False
     return not (row.get("beside") == ("--beside",) and row.get("input") == "e.txt")
+
+
+VIEW = {
+    "input": ["frames.h5", "e.txt", "recording", "recording.zip"],
+    "output": ["a.html", "a"],
+    "frames": [NO, ("--no-frames",)],
+    **PART,
+    "turn": TURN,
+    "back": SET_BACK,
+    "outside": [NO, ("--crop-events",)],
+    "size": [NO, ("--size", "20x30")],
+    "voice": VOICE,
+    "existing": EXISTING,
+}
 
 
 INFO = {
@@ -236,6 +253,7 @@ def fits_batch(row):
 COMMANDS = {
     "convert": (CONVERT, fits_convert),
     "render": (RENDER, fits_render),
+    "view": (VIEW, lambda row: True),
     "info": (INFO, fits_info),
     "export": (EXPORT, fits_export),
     "compare": (COMPARE, fits_compare),
@@ -367,6 +385,8 @@ def is_whole(command, words, path, out):
         return read_events(path).events.size > 0
     if path.suffix in (".mp4", ".avi", ".webm", ".gif"):
         return cv2.VideoCapture(str(path)).read()[0]
+    if command == "view":
+        return "all events drawn" in path.read_text("utf-8")
     if path.suffix == ".png":
         return cv2.imread(str(path)) is not None
     return "--dry-run" in words or bytes_below(path)

@@ -25,7 +25,7 @@ for command in json.loads(sys.argv[1]):
 LINES = "".join(f"{0.001 * k:.9f} {k % 8} {k % 6} {k % 2}\n" for k in range(100))
 
 
-def test_info_render_and_config_import_no_numba(tmp_path):
+def test_info_render_view_and_config_import_no_numba(tmp_path):
     folder = tmp_path / "folder"
     (folder / "images").mkdir(parents=True)
     (folder / "images.txt").write_text("0.0 images/a.png\n0.05 images/b.png\n")
@@ -44,6 +44,7 @@ def test_info_render_and_config_import_no_numba(tmp_path):
     commands = [
         *(["--help"], ["render", "--help"], ["config", "show"], ["config", "defaults"]),
         *(["info", str(tmp_path / name)] for name in names),
+        ["view", str(folder), "-o", str(tmp_path / "out.html")],
         *(["render", str(folder), "-o", str(tmp_path / f"out.{kind}")] for kind in ("png", "mp4")),
     ]
 

@@ -98,10 +98,11 @@ def test_compare_of_a_stray_time_says_so_at_once(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["measures"]["error"]["value"] == 0
 
 
-@pytest.mark.parametrize("command", ["info", "compare", "render"])
+@pytest.mark.parametrize("command", ["info", "compare", "render", "view"])
 def test_a_stray_coordinate_is_named(tmp_path, capsys, command):
     path = write(tmp_path / "a.txt", "0.1 1 1 1", "0.2 30000 30000 0", "0.3 3 3 1")
     more = {"compare": [path], "render": ["-o", str(tmp_path / "o.png")]}
+    more["view"] = ["-o", str(tmp_path / "o.html")]
     with pytest.raises(SystemExit) as ended:
         main([command, path, *more.get(command, [])])
     told = capsys.readouterr().err

@@ -140,11 +140,12 @@ def test_virtual_datasets_are_refused_by_name(tmp_path):
     assert run.stdout.split() == ["refused"] * 10, run.stderr
 
 
-@pytest.mark.parametrize("command", ["info", "compare", "render", "diagnose"])
+@pytest.mark.parametrize("command", ["info", "compare", "render", "view", "diagnose"])
 @pytest.mark.quick_cases(1)
 def test_commands_end_in_one_line(tmp_path, command):
     path = changed(tmp_path / "a.h5", "events/xs", virtual("events/xs", whole(tmp_path / "b.h5")))
     more = {"compare": [path], "render": ["-o", tmp_path / "o.png"],
+            "view": ["-o", tmp_path / "o.html"],
             "diagnose": ["-o", tmp_path / "report"]}  # fmt: skip
     run = subprocess.run(
         [sys.executable, "-m", "adv2e", command, path, *more.get(command, [])],

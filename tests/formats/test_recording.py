@@ -1,5 +1,9 @@
 """Recordings in Python: length, parts by time, saving, and how they are shown."""
 
+import re
+from base64 import b64decode
+
+import cv2
 import numpy as np
 import pytest
 
@@ -94,7 +98,11 @@ def test_it_is_shown_in_a_line():
 def test_notebooks_show_a_picture():
     html = recording()._repr_html_()
     assert "&lt;Recording drive.h5: 5 events" in html
-    assert 'src="data:image/png;base64,' in html
+    pictures = re.findall('src="data:image/png;base64,([^"]+)"', html)
+    sizes = [cv2.imdecode(np.frombuffer(b64decode(one), np.uint8), 1).shape for one in pictures]
+    assert [size[1] > size[0] for size in sizes] == [True, True]  # events, and their rate below
+    assert sizes[1][:2] == (340, 960)
+    assert "<script" not in html
     nothing = Recording("<b>.h5", "array", 4, 3, EVENTS[:0])._repr_html_()
     assert "<img" not in nothing
     assert "<b>" not in nothing

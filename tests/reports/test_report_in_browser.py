@@ -2,25 +2,18 @@
 
 import html
 import re
-import shutil
-import subprocess
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from browser import browse, needs_a_browser
 from made_up_diagnosis import everything, strange
 
 from adv2e.reports.page import page
 from adv2e.reports.result import Detectable, Rejected, ResidualMap, Signature
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
+pytestmark = needs_a_browser
 
-OPTIONS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--hide-scrollbars",
-)  # fmt: skip
 FRAME = """<!DOCTYPE html><iframe width="390" height="844" srcdoc="{page}"></iframe>
 <pre id="told"></pre><script>onload = () => {{
   const page = document.querySelector("iframe").contentDocument;
@@ -29,14 +22,6 @@ FRAME = """<!DOCTYPE html><iframe width="390" height="844" srcdoc="{page}"></ifr
   document.querySelector("#told").textContent =
     [page.documentElement.scrollWidth, before.left, before.right, before.bottom];
 }}</script>"""
-
-
-def browse(folder, *options):
-    done = subprocess.run(
-        [CHROMIUM, *OPTIONS, f"--user-data-dir={folder / 'profile'}", *options],
-        capture_output=True, check=True, timeout=120,
-    )  # fmt: skip
-    return done.stdout.decode()
 
 
 def full_size():
