@@ -22,7 +22,8 @@ from adv2e.effects.hooks import Frames, Hooks, LightFrame
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.errors import ConfigError, DataError, UsageError, warn
 from adv2e.events import Events, empty_events
-from adv2e.light.decoding import decoder_for, kernel_table, light_text
+from adv2e.label import Label
+from adv2e.light.decoding import decoder_for, kernel_table, light_line
 from adv2e.light.intervals import Intervals
 from adv2e.light.sensor import fitting_of
 from adv2e.pixel.array import PixelArray
@@ -51,6 +52,7 @@ def simulate(
     threads: int | None = None,
     causes: bool = False,
     progress: bool = False,
+    strict: bool = False,
 ) -> Iterator[Events]:
     """Return an iterator over the events of a sequence of frames, sorted, chunk by chunk.
 
@@ -79,6 +81,8 @@ def simulate(
         what made it.
     progress : bool
         Show a progress bar on stderr.
+    strict : bool
+        Raise DataError where it must guess what the frames stand for: `frames.encoding` is auto.
 
     Returns
     -------
@@ -126,7 +130,7 @@ def simulate(
     first = next(coming, None)
     if first is None:
         raise DataError("no frames: at least two are needed")
-    decoder = _decoder_for(np.asarray(first), config)
+    decoder = _decoder_for(np.asarray(first), config, strict=strict)
     rows, columns = np.shape(first)[:2]
     fitting = fitting_of(columns, rows, config.sensor, "frame 0")
     table = kernel_table(decoder, config.sampling, hooks, fitting)
@@ -236,7 +240,7 @@ def _checked(
         raise DataError(f"more times than frames, of which there are {number + 1}")
 
 
-def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
+def _decoder_for(image: NDArray[Any], config: Config, *, strict: bool) -> LightDecoder:
     colour = image.ndim == 3
     if image.ndim not in (2, 3) or (colour and image.shape[2] != 3):
         raise DataError(
@@ -244,9 +248,13 @@ def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
         )
     light = light_of_images(Frame(image), "arrays")
     decoder = decoder_for(config.frames, image.dtype, colour, auto=light.encoding)
-    if config.frames.encoding == "auto" and light.is_guess:
-        taken = light_text(light, decoder.full_scale, config.frames)
-        warn(f"frames are {taken}")
+    taken = light_line(light, decoder.full_scale, config.frames)
+    if strict:
+        label = Label()
+        label.add(taken)
+        label.refuse("frames")
+    if config.frames.encoding == "auto" and light.is_doubtful:
+        warn(taken)
     return decoder
 
 
@@ -261,6 +269,7 @@ def events_from_light(
     complete: Callable[[int], None] | None = None,
     causes: bool = False,
     given: GivenFlow | None = None,
+    fired: Callable[[int], None] | None = None,
 ) -> Iterator[Events]:
     """Yield the events of a sequence of (t_ns, light [DN]), sorted, chunk by chunk.
 
@@ -269,7 +278,8 @@ def events_from_light(
     it decodes.  `coarseness`, `causes`: see :class:`adv2e.pixel.array.PixelArray`.
     `complete` is called now and then with a time [us] before which no event will come any more; not
     so if effects change events, as they may change times.  `given`: see
-    :func:`adv2e.light.interpolation.make_upsampler`.
+    :func:`adv2e.light.interpolation.make_upsampler`.  `fired` is told how many events the pixels
+    make, of which the readout may lose some.
 
     Raises
     ------
@@ -293,7 +303,16 @@ def events_from_light(
         coarseness=coarseness,
         causes=causes,
     )
+    made = made if fired is None else _counted(made, fired)
     yield from _limited(map_events(hooks, made, causes), config.max_events)
+
+
+def _counted(made: Iterator[Events], fired: Callable[[int], None]) -> Iterator[Events]:
+    """Yield the events, and tell how many they are."""
+    for events in made:
+        fired(events.size)
+        yield events
+        del events  # or they would stay while the next ones are made
 
 
 def _limited(made: Iterator[Events], most: int) -> Iterator[Events]:

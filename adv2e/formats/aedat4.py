@@ -56,6 +56,7 @@ from adv2e.files.regular import expand
 from adv2e.formats.clock import shots_in_order
 from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry, joined
 from adv2e.formats.writing import Pieces, Request, Writer
+from adv2e.label import left_out
 from adv2e.light.pictures import eight_bit
 from adv2e.sources.frame import Frame, Shot, Track, counted
 from adv2e.ticks import US, check_time, check_us
@@ -355,7 +356,9 @@ def _packets(
         number, size = struct.unpack("<ii", start) if len(start) == 8 else (0, 0)
         if at + 8 > head.end or len(start) < 8 or (size >= 0 and at + 8 + size > head.end):
             if head.interrupted:
-                problem = "the recording was interrupted: its last packet is cut, left out"
+                problem = left_out(
+                    "the recording was interrupted: its last packet is cut, left out"
+                )
                 if problem not in facts.problems:
                     facts.problems.append(problem)
                 return

@@ -67,6 +67,7 @@ from adv2e.formats.binary import DECODERS
 from adv2e.formats.clock import shots_in_order
 from adv2e.formats.event_file import MOST_COLUMNS, Columns, EventFile, Facts, joined
 from adv2e.formats.writing import Pieces, Request, Writer, to_json
+from adv2e.label import left_out
 from adv2e.light.pictures import eight_bit
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.frame import Frame, Shot, Track, counted
@@ -243,7 +244,7 @@ class PacketReader:
         elif lost > 0:  # and with them, perhaps, turns of the clock
             turn = 1 << self._decoder.bits
             self._shift_us += round((stamp_us - first - self._shift_us) / turn) * turn
-            self._tell(f"{label}: {lost:,} packets before it are missing")
+            self._tell(left_out(f"{label}: {lost:,} packets before it are missing", "packets"))
         return t + self._shift_us, x, y, p
 
     def end(self) -> None:
