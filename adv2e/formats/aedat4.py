@@ -55,7 +55,7 @@ from adv2e.files.backlog import Backlog
 from adv2e.files.regular import expand
 from adv2e.formats.clock import shots_in_order
 from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry, joined
-from adv2e.formats.writing import Pieces, Request, Writer
+from adv2e.formats.writing import ROOM, Pieces, Request, Writer
 from adv2e.label import left_out
 from adv2e.light.pictures import eight_bit
 from adv2e.sources.frame import Frame, Shot, Track, counted
@@ -421,7 +421,7 @@ class Aedat4Writer(Writer):
         except MissingExtraError:
             self._lz4 = None
         self._file = stack.enter_context(path.open("wb"))
-        self._text = "".join(self._xml()).encode("ascii")
+        self._text = "".join(self._xml(ROOM)).encode("ascii")
         self._file.write(MAGIC + self._header(0))
         self._frames = stack.enter_context(closing(Backlog(path.parent)))
         self._pieces = Pieces(_PACKET, EVENT_DTYPE)
@@ -443,6 +443,9 @@ class Aedat4Writer(Writer):
         self._write_frames(None)
         end = self._file.tell()
         self._file.write(self._packed(_data_table(self._rows)))
+        text = "".join(self._xml(0)).encode("ascii")
+        if len(text) <= len(self._text):  # with what is known only now
+            self._text = text.ljust(len(self._text))
         self._file.seek(len(MAGIC))
         self._file.write(self._header(end))
 
@@ -490,7 +493,7 @@ class Aedat4Writer(Writer):
         data = fields + table + struct.pack("<I", len(self._text)) + self._text + b"\0"
         return struct.pack("<I", len(data)) + data
 
-    def _xml(self) -> Iterator[str]:
+    def _xml(self, room: int) -> Iterator[str]:
         streams = [("events", "EVTS"), ("frames", "FRME")][: 1 + self._request.with_frames]
         compression = "NONE" if self._lz4 is None else "LZ4"
         about = json.dumps(self._request.description, allow_nan=False)
@@ -511,7 +514,7 @@ class Aedat4Writer(Writer):
             if number == _EVENT_STREAM:
                 yield f'<attr key="adv2e" type="string">{escape(about)}</attr>'
             yield "</node></node>"
-        yield "</node></dv>\n"
+        yield "</node></dv>\n" + " " * room
 
 
 def _data_table(rows: list[tuple[int, ...]]) -> bytes:

@@ -664,12 +664,12 @@ class Ros2Writer(_BagWriter):
         self._folder = path / (self._request.path.name or "bag")
         plugin = rosbag2.StoragePlugin.MCAP
         bag = rosbag2.Writer(self._folder, version=8, storage_plugin=plugin)
-        bag.set_custom_data("adv2e", to_json(self._request.description))
         bag.open()
         return bag
 
     def finish(self) -> None:
         """Write the remaining events and frames, and close the bag."""
+        self._bag.set_custom_data("adv2e", to_json(self._request.description))
         super().finish()
         for file in sorted(self._folder.iterdir()):
             file.rename(self._folder.parent / file.name)

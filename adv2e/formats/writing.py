@@ -20,7 +20,7 @@ from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -50,6 +50,9 @@ _ZLIB = b"\x78\x01"
 
 _STORED, _WINDOW, _PROBE = 0xFFFF, 1 << 15, 1 << 10
 """Most bytes of a stored block of deflate; how far it looks back; bytes of a part looked at."""
+
+ROOM = 4096
+"""Blanks behind a description with which a file begins."""
 
 _NO_FRAMES = (
     "the frames of the recording are not written: 'adv2e convert IN -o OUT --from events"
@@ -420,10 +423,7 @@ class Sink:
                 self._writer.write_frame(t_ns, image)
 
     def describe(self, **more: Any) -> None:
-        """Add to the description what is known only at the end.
-
-        Formats that begin with it do not hold that: AEDAT, bags of ROS 2, and .raw and .dat.
-        """
+        """Add to the description what is known only at the end."""
         self._description.update(more)
 
     def __enter__(self) -> Sink:
@@ -489,6 +489,24 @@ def to_json(description: dict[str, Any]) -> str:
 def to_line(description: dict[str, Any]) -> str:
     """Return the description as one line of ASCII."""
     return json.dumps(json.loads(to_json(description)))
+
+
+def begin_with(
+    file: BinaryIO, head: Callable[[str], bytes], description: dict[str, Any], stack: ExitStack
+) -> None:
+    """Write a head that holds the description in a line; at the end, again with all that it holds.
+
+    Blanks behind the line leave room for what is known at the end.
+    """
+    room = len(to_line(description)) + ROOM
+    file.write(head(to_line(description).ljust(room)))
+
+    def again() -> None:
+        if len(line := to_line(description)) <= room:
+            file.seek(0)
+            file.write(head(line.ljust(room)))
+
+    stack.callback(again)
 
 
 def compress(array: NDArray[Any]) -> bytes:
