@@ -193,7 +193,7 @@ class Source(ABC):
             return ""
         told = doubt_of_white(largest, self.dtype, self.path)
         why = "all that was seen is far below it"
-        return told and guessed(told, WHITE, full_scale_of(self.dtype), SAY_WHITE, why)
+        return told and guessed(told, WHITE, int(full_scale_of(self.dtype)), SAY_WHITE, why)
 
     @abstractmethod
     def shots(self) -> Iterator[Shot]:

@@ -94,7 +94,7 @@ def open_listing(
         other = files.label(listing.other)
         told = f"its first camera is taken; the second is {other}"
         first = files.label(listing.place.rpartition("/")[0])
-        how, why = f"give {first} or {other}", "it has two"
+        how, why = f"give {first} or {other}", "there are two of them"
         source.notes.append(told_of(path, guessed(told, "camera", "the first", how, why)))
     return source
 
