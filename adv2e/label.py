@@ -17,38 +17,32 @@ from numpy.typing import NDArray
 
 from adv2e.errors import DataError
 
-ENCODING, SAY_ENCODING = "frames.encoding", "give --set frames.encoding=..."
-WHITE, SAY_WHITE = "frames.full_scale", "give --set frames.full_scale=..."
-"""Keys of what the numbers of frames stand for, and how to say it."""
+ENCODING, WHITE = "frames.encoding", "frames.full_scale"
+"""Keys of what the numbers of frames stand for."""
 
 _GAP = 1.5
-"""Intervals between frames from so many usual ones on are gaps."""
+"""Intervals between frames that are longer than so many usual ones are gaps."""
 
 
 class Line(str):
-    """A line for people that has an entry in a part of the label; `settle` says a guess better."""
+    """A line for people, and its entry in a part of the label; `settle` says a guess better."""
 
     part: str
     entry: Any
     settle: str
 
-    @property
-    def what(self) -> str:
-        """Name of what is guessed; empty for others."""
-        return str(self.entry["what"]) if self.part == "guessed" else ""
+    def __new__(cls, text: str, part: str = "", entry: Any = None, settle: str = "") -> Line:
+        """Make one of a text; a copy is made of the text alone, and then filled."""
+        line = super().__new__(cls, text)
+        line.part, line.entry, line.settle = part, entry, settle
+        return line
 
     def like(self, text: str) -> Line:
         """Return another text with the same entry."""
-        return _line(text, self.part, self.entry, self.settle)
+        return Line(text, self.part, self.entry, self.settle)
 
 
-def _line(text: str, part: str, entry: Any, settle: str = "") -> Line:
-    line = Line(text)
-    line.part, line.entry, line.settle = part, entry, settle
-    return line
-
-
-def guessed(text: str, what: str, value: Any, settle: str, why: str = "") -> Line:
+def guessed(text: str, what: str, value: Any, settle: str = "", why: str = "") -> Line:
     """Return a line that tells a guess.
 
     Parameters
@@ -56,18 +50,19 @@ def guessed(text: str, what: str, value: Any, settle: str, why: str = "") -> Lin
     text : str
         The line, without the name of a file: it may be the reason, too.
     what, value : str, object
-        What is guessed, and what it is taken for.
+        What is guessed, such as a key of the configuration, and what it is taken for.
     settle : str
-        Which option or key says it.
+        What says it; default: the key.
     why : str
         The reason, in a few words.
     """
-    return _line(text, "guessed", {"what": what, "value": value, "why": why or text}, settle)
+    entry = {"what": what, "value": value, "why": why or text}
+    return Line(text, "guessed", entry, settle or f"give --set {what}=...")
 
 
 def left_out(text: str, entry: str = "") -> Line:
     """Return a line that tells what is left out; `entry` where the label has it shorter."""
-    return _line(text, "left_out", entry or text)
+    return Line(text, "left_out", entry or text)
 
 
 def told_of(place: object, line: str) -> str:
@@ -112,22 +107,17 @@ class Label:
     def add(self, *lines: str) -> None:
         """Take what of the lines belongs into the label."""
         for line in lines:
-            if not isinstance(line, Line) or line.what in self._said:
-                continue
-            held = self.entries[line.part]
-            if line.entry not in held:
-                held.append(line.entry)
-            if line.what:
-                value = line.entry["value"]
-                self._guesses[f"{line.what}: {value} is a guess: {line.settle}"] = None
+            if isinstance(line, Line) and line.part == "guessed":
+                what, value = line.entry["what"], line.entry["value"]
+                if what in self._said:
+                    continue
+                self._guesses[f"{what}: {value} is a guess: {line.settle}"] = None
+            if isinstance(line, Line) and line.entry not in self.entries[line.part]:
+                self.entries[line.part].append(line.entry)
 
-    def drop(self, what: str) -> None:
-        """Leave out what was guessed of a key, and turned out to be right."""
-        held = self.entries["guessed"]
-        held[:] = [one for one in held if one["what"] != what]
-
-    def refuse(self, path: object) -> None:
-        """Raise DataError if lines were guesses; it names all, and what says each."""
+    def refuse(self, path: object, *lines: str) -> None:
+        """Take lines; raise DataError if there are guesses: it names all, and what says each."""
+        self.add(*lines)
         if self._guesses:
             raise DataError(f"{path}: {'; '.join(self._guesses)}")
 

@@ -18,34 +18,34 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1670,
-    "batches": 1515,
+    "": 1815,
+    "batches": 1520,
     "cli": 1235,
     "comparison": 1165,
     "compilation": 285,
     "config": 1315,
-    "conversion": 1195,
+    "conversion": 1245,
     "diagnosis": 8320,
     "effects": 1615,
     "exporting": 1075,
     "files": 785,
-    "formats": 5110,
-    "inspection": 260,
+    "formats": 5135,
+    "inspection": 270,
     "kernel": 5940,
-    "light": 890,
+    "light": 895,
     "motion": 370,
     "pixel": 575,
     "process": 265,
     "rendering": 740,
     "reports": 1791,
     "representations": 145,
-    "side": 845,
-    "sources": 3680,
+    "side": 850,
+    "sources": 3705,
     "synthetic": 160,
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 340
+FILES = 341
 """Most modules of all packages together."""
 
 _SLACK = 60

@@ -224,18 +224,17 @@ def convert_reading(
         config = replace(config, frames=replace(config.frames, exposure_us=mean_us))
     decoder, fitting = decoding_of(recording, config)
     doubt = label = Label(say, said=_said(config))
-    label.entries["sha256"] = {"config": digest_of_values(to_dict(config))}
-    if source_sha256 is not None:
-        label.entries["sha256"]["source"] = source_sha256
+    digests = {"config": digest_of_values(to_dict(config)), "source": source_sha256}
+    label.entries["sha256"] = digests
     format, layout, causes = options["format"], options["layout"], options["causes"]
     target = output or default_output(reading.path, format)
     chosen = to_write(Path(target), format, layout)
     with_frames, preview = options["with_frames"], options["preview"]
     if with_frames:
         check_frames(chosen)
-    keeps_all_bits = chosen.is_davis240c
-    with_frames = with_frames or keeps_all_bits
-    white = picture_white(recording.dtype, decoder.full_scale, not keeps_all_bits)
+    eight_bit = not chosen.is_davis240c
+    with_frames = with_frames or not eight_bit
+    white = picture_white(recording.dtype, decoder.full_scale, eight_bit)
     frames = Size(recording.width, recording.height)
     width, height = frames if fitting is None else fitting.size
     # events and preview come into place together, when all is written
@@ -256,9 +255,9 @@ def convert_reading(
     files = _side_files(side, blurred, clock, doubt)
     taken = light_line(recording.light, recording.full_scale, config.frames)
     told = _doubt_of_white(recording, recording.largest, config)
-    label.add(taken, *recording.selection.left_out, *recording.doubts, *recording.notes, told)
+    label.add(taken, *recording.selection.left_out, *recording.doubts, *recording.notes)
     if options["strict"]:
-        label.refuse(recording.path)
+        label.refuse(recording.path, told)
     response = config.pixel.log_response
     floor = None if response.linear_below else response.floor
     noted = Seen(decoder.full_scale, recording.dtype, floor)
@@ -297,13 +296,7 @@ def convert_reading(
         stated = config.frames.full_scale
         decoded = reading.decoded(
             Decoding(
-                decoder,
-                table is not None,
-                out.wants_frames,
-                stated,
-                not keeps_all_bits,
-                fitting,
-                noted,
+                decoder, table is not None, out.wants_frames, stated, eight_bit, fitting, noted
             )
         )
         if progress:
@@ -329,8 +322,6 @@ def convert_reading(
         label.add(*recording.notes, found)
         if options["strict"]:  # what only all frames tell
             label.refuse(recording.path)
-        if told and not found:
-            label.drop(WHITE)
         if (lost := sum(fired) - out.events) > 0:
             label.add(left_out(f"{lost:,} events that the readout lost"))
         interpolation = config.sampling.interpolation if config.sampling.L > 1 else "linear"

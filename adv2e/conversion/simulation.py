@@ -250,9 +250,7 @@ def _decoder_for(image: NDArray[Any], config: Config, *, strict: bool) -> LightD
     decoder = decoder_for(config.frames, image.dtype, colour, auto=light.encoding)
     taken = light_line(light, decoder.full_scale, config.frames)
     if strict:
-        label = Label()
-        label.add(taken)
-        label.refuse("frames")
+        Label().refuse("frames", taken)
     if config.frames.encoding == "auto" and light.is_doubtful:
         warn(taken)
     return decoder
@@ -299,20 +297,12 @@ def events_from_light(
         table,
         complete,
         given,
+        fired,
         threads=threads,
         coarseness=coarseness,
         causes=causes,
     )
-    made = made if fired is None else _counted(made, fired)
     yield from _limited(map_events(hooks, made, causes), config.max_events)
-
-
-def _counted(made: Iterator[Events], fired: Callable[[int], None]) -> Iterator[Events]:
-    """Yield the events, and tell how many they are."""
-    for events in made:
-        fired(events.size)
-        yield events
-        del events  # or they would stay while the next ones are made
 
 
 def _limited(made: Iterator[Events], most: int) -> Iterator[Events]:
@@ -338,6 +328,7 @@ def _pixel_events(
     table: NDArray[np.float32] | None,
     complete: Callable[[int], None] | None,
     given: GivenFlow | None,
+    fired: Callable[[int], None] | None,
     **options: Any,
 ) -> Iterator[Events]:
     """Yield the sorted events of the pixels, as they are before the readout.
@@ -369,6 +360,8 @@ def _pixel_events(
             if complete is not None:
                 complete(end_us)
             intervals.expect(count)
+            if fired is not None:
+                fired(count)
             for hook in hooks:
                 hook.passed(part.times_ns[-1] * 1e-9)
         yield order.rest()

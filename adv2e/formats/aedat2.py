@@ -51,7 +51,7 @@ from adv2e.events import Events
 from adv2e.formats.binary import Numbers, blocks
 from adv2e.formats.clock import CONTINUE, Clock
 from adv2e.formats.event_file import Columns, EventFile, Facts
-from adv2e.formats.writing import Request, Writer, begin_with
+from adv2e.formats.writing import Request, Writer, to_line
 from adv2e.label import guessed, left_out
 from adv2e.sources.frame import Frame, Shot
 
@@ -284,12 +284,8 @@ class Aedat2Writer(Writer):
         self._last = request.width - 1, request.height - 1
         chip = _WRITTEN.get((request.width, request.height))
         named = [f"# AEChip: eu.seebetter.ini.chips.davis.{chip}"] if chip else []
-
-        def head(settings: str) -> bytes:
-            lines = [*_HEAD, *named, f"# adv2e {settings}", _END]
-            return "".join(f"{line}\r\n" for line in lines).encode("ascii")
-
-        begin_with(self._file, head, request.description, stack)
+        lines = [*_HEAD, *named, f"# adv2e {to_line(request.description)}", _END]
+        self._file.write("".join(f"{line}\r\n" for line in lines).encode("ascii"))
         self._is_first = True
 
     def write_events(self, events: Events) -> None:

@@ -183,12 +183,12 @@ class PacketReader:
 
     Parameters
     ----------
-    problems : list of str
-        Is added what is to be told.
+    tell : callable
+        Takes what is to be told; packets may be read more than once.
     """
 
-    def __init__(self, problems: list[str]) -> None:
-        self._problems = problems
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        self._tell = tell
         self._decoder: Any = None
         self._shift_us: int | None = None
         self._number: int | None = None
@@ -251,10 +251,6 @@ class PacketReader:
         """Report the problems of all packets."""
         for text in self._decoder.problems() if self._decoder is not None else ():
             self._tell(text)
-
-    def _tell(self, text: str) -> None:
-        if text not in self._problems:  # packets may be read more than once
-            self._problems.append(text)
 
 
 def _of_mono(words: NDArray[np.uint64], stamp_ns: int) -> Columns:
@@ -424,7 +420,7 @@ class _Bag:
     """
 
     def __init__(self, path: Path, facts: Facts) -> None:
-        self._path, self._reader, self._problems = path, None, facts.problems
+        self._path, self._reader, self._tell = path, None, facts.tell
         self.is_ros1 = path.suffix.lower() == ".bag"
         with _reading(path):
             self._reader = _opened(path, self.is_ros1)
@@ -463,7 +459,7 @@ class _Bag:
         """Yield the messages of events."""
         if self._events is None:
             return
-        packets = PacketReader(self._problems) if self._events.holds in _PACKETS else None
+        packets = PacketReader(self._tell) if self._events.holds in _PACKETS else None
         read: Callable[[bytes, bool, str], EventMessage] = packets or read_event_array
         for number, (_, data) in enumerate(self._messages(self._events)):
             label = f"{self._path}: {self._events.name} message {number}"

@@ -10,7 +10,6 @@ import re
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from adv2e.background import OrderedWork
 from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.formats.event_file import Column, Columns, EventFile, Facts, described_geometry
-from adv2e.formats.writing import Request, Writer, begin_with
+from adv2e.formats.writing import Request, Writer, to_line
 from adv2e.label import left_out
 from adv2e.ticks import US, check_time
 
@@ -240,16 +239,17 @@ def read_header(path: Path) -> Header:
     return Header(path, values, at)
 
 
-def raw_header(request: Request, version: str, settings: str) -> bytes:
+def raw_header(request: Request, version: str) -> bytes:
     """Return the whole header of a RAW file in EVT of that version, such as 3.0."""
     encoding = f"EVT{version[0]};height={request.height};width={request.width}"
     geometry = f"geometry {request.width}x{request.height}"
-    return header_of(f"evt {version}", f"format {encoding}", geometry, settings) + b"% end\n"
+    return header_of(request, f"evt {version}", f"format {encoding}", geometry) + b"% end\n"
 
 
-def header_of(*lines: str) -> bytes:
-    """Return a header of such lines, the last being the settings; its end is left to the caller."""
-    return "".join(f"% {line}\n" for line in (*lines[:-1], f"adv2e {lines[-1]}")).encode("ascii")
+def header_of(request: Request, *lines: str) -> bytes:
+    """Return a header of such lines and the settings; the end is for the caller to add."""
+    settings = f"adv2e {to_line(request.description)}"
+    return "".join(f"% {line}\n" for line in (*lines, settings)).encode("ascii")
 
 
 # ---- Events in Event Stream, version 2, in files that end on ``.es``; of its types, DVS events.
@@ -491,9 +491,8 @@ class DatWriter(Writer):
     def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._file = stack.enter_context(path.open("wb"))
         sizes = f"Width {request.width}", f"Height {request.height}"
-        lines = partial(header_of, "Data file containing CD events.", "Version 2", *sizes)
-        begin_with(self._file, lines, request.description, stack)
-        self._file.write(bytes([_TYPE, _SIZE]))
+        first = "Data file containing CD events."
+        self._file.write(header_of(request, first, "Version 2", *sizes) + bytes([_TYPE, _SIZE]))
 
     def write_events(self, events: Events) -> None:
         """Append events."""
@@ -820,7 +819,7 @@ class Evt2Writer(Writer):
 
     def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._file = stack.enter_context(path.open("wb"))
-        begin_with(self._file, partial(raw_header, request, "2.0"), request.description, stack)
+        self._file.write(raw_header(request, "2.0"))
         self._file.write(np.array([_HIGH << 28], "<u4").data)
         self._high = 0
 
@@ -848,7 +847,7 @@ class Evt3Writer(Writer):
 
     def __init__(self, request: Request, stack: ExitStack, path: Path) -> None:
         self._file = stack.enter_context(path.open("wb"))
-        begin_with(self._file, partial(raw_header, request, "3.0"), request.description, stack)
+        self._file.write(raw_header(request, "3.0"))
         self._work = OrderedWork(request.threads - 1)
         stack.callback(self._work.abandon)
         self._state = -1, -1, -1  # high and low bits of the time, row

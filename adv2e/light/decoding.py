@@ -10,7 +10,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from adv2e.effects.composition import overrides
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
-from adv2e.label import ENCODING, SAY_ENCODING, guessed
+from adv2e.label import ENCODING, guessed
 
 if TYPE_CHECKING:  # 'adv2e info' does without the configuration, which takes time to import
     from adv2e.config.model import Frames, Sampling
@@ -72,4 +72,4 @@ def light_line(light: Light, white: float, frames: Frames | None = None) -> str:
     line = f"frames are {light_text(light, white, frames)}"
     if light.is_stated or (frames and frames.encoding != "auto"):
         return line
-    return guessed(line, ENCODING, light.encoding, SAY_ENCODING, light.encoding_reason)
+    return guessed(line, ENCODING, light.encoding, why=light.encoding_reason)

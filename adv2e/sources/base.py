@@ -24,7 +24,7 @@ from adv2e.effects.frames.brightness import doubt_of_white
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError, UsageError
 from adv2e.geometry import Rectangle, Size
-from adv2e.label import ENCODING, SAY_ENCODING, SAY_WHITE, WHITE, guessed, left_out, told_of
+from adv2e.label import ENCODING, WHITE, guessed, left_out, told_of
 from adv2e.options import EventInput, FrameInput, SourceOptions, crop_of
 from adv2e.sources.frame import (
     OVER_BLACK,
@@ -193,7 +193,7 @@ class Source(ABC):
             return ""
         told = doubt_of_white(largest, self.dtype, self.path)
         why = "all that was seen is far below it"
-        return told and guessed(told, WHITE, int(full_scale_of(self.dtype)), SAY_WHITE, why)
+        return told and guessed(told, WHITE, int(full_scale_of(self.dtype)), why=why)
 
     @abstractmethod
     def shots(self) -> Iterator[Shot]:
@@ -275,7 +275,7 @@ class Source(ABC):
         if self._light_is_stated and light_of_images(frame).encoding != self.encoding:
             line = f"not all frames state the same encoding as the first, such as {label}; all are"
             taken, why = self.encoding, "not all frames state the same encoding"
-            self._note(guessed(f"{line} taken as {taken}", ENCODING, taken, SAY_ENCODING, why))
+            self._note(guessed(f"{line} taken as {taken}", ENCODING, taken, why=why))
         if self.largest_read == 0 or self.doubt_of_white(self.largest_read):
             self.largest_read = max(self.largest_read, float(image.max()))
         odd = "" if self._white_told is not None else odd_white(frame, self._white_stated)

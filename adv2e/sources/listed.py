@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from adv2e.errors import DataError
-from adv2e.label import SAY_WHITE, WHITE, guessed, told_of
+from adv2e.label import WHITE, guessed, told_of
 from adv2e.sources.base import GivenTimes, Selection, Source
 from adv2e.sources.bayer import in_colour, light_of
 from adv2e.sources.frame import Frame, Light, Shot, check_values
@@ -185,7 +185,7 @@ class ListedSource(Source):
         elif self.largest > 1:
             told = f"values above 1.0 (up to {self.largest:g} in the first frame); white is 1.0"
             told += " unless frames.full_scale says otherwise"
-            self.notes.append(guessed(told, WHITE, 1.0, SAY_WHITE))
+            self.notes.append(guessed(told, WHITE, 1.0))
 
     def _look_for_white(self) -> None:
         """Look at more frames than the first, should it be far below white."""
