@@ -214,7 +214,7 @@ def rows_of(label: Any) -> Iterator[tuple[str, str]]:
 def _rows(label: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for one in label["guessed"]:
         yield "guessed", f"{one['what']} {one['value']} ({one['why']})"
-    if not label["guessed"]:
+    if "sha256" in label and not label["guessed"]:  # of others, only the copying is known
         yield "guessed", "nothing"
     if made_up := label.get("made_up"):
         told = "light between frames, by {interpolation} interpolation: {share:.3g} % of the time;"

@@ -706,4 +706,6 @@ def test_a_line_stays_one_in_other_words():
     label(left_out("some"))
     assert (told, label.entries) == ([line, "some"], {"guessed": [], "left_out": ["some"]})
     label.refuse("a.txt")
-    assert list(rows_of(label.entries)) == [("guessed", "nothing"), ("left out", "some")]
+    assert list(rows_of(label.entries)) == [("left out", "some")]
+    simulated = {**label.entries, "sha256": {}}
+    assert list(rows_of(simulated)) == [("guessed", "nothing"), ("left out", "some")]

@@ -23,7 +23,7 @@ from adv2e.effects.reorder_buffer import InOrder
 from adv2e.errors import ConfigError, DataError, UsageError, warn
 from adv2e.events import Events, empty_events
 from adv2e.label import Label
-from adv2e.light.decoding import decoder_for, kernel_table, light_line
+from adv2e.light.decoding import decoder_for, kernel_table, light_line, light_text
 from adv2e.light.intervals import Intervals
 from adv2e.light.sensor import fitting_of
 from adv2e.pixel.array import PixelArray
@@ -130,7 +130,10 @@ def simulate(
     first = next(coming, None)
     if first is None:
         raise DataError("no frames: at least two are needed")
-    decoder = _decoder_for(np.asarray(first), config, strict=strict)
+    if strict:
+        meant = light_of_images(Frame(np.asarray(first)), "arrays")
+        Label().refuse("frames", light_line(meant, 0, config.frames))
+    decoder = _decoder_for(np.asarray(first), config)
     rows, columns = np.shape(first)[:2]
     fitting = fitting_of(columns, rows, config.sensor, "frame 0")
     table = kernel_table(decoder, config.sampling, hooks, fitting)
@@ -240,7 +243,7 @@ def _checked(
         raise DataError(f"more times than frames, of which there are {number + 1}")
 
 
-def _decoder_for(image: NDArray[Any], config: Config, *, strict: bool) -> LightDecoder:
+def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
     colour = image.ndim == 3
     if image.ndim not in (2, 3) or (colour and image.shape[2] != 3):
         raise DataError(
@@ -248,11 +251,9 @@ def _decoder_for(image: NDArray[Any], config: Config, *, strict: bool) -> LightD
         )
     light = light_of_images(Frame(image), "arrays")
     decoder = decoder_for(config.frames, image.dtype, colour, auto=light.encoding)
-    taken = light_line(light, decoder.full_scale, config.frames)
-    if strict:
-        Label().refuse("frames", taken)
     if config.frames.encoding == "auto" and light.is_doubtful:
-        warn(taken)
+        taken = light_text(light, decoder.full_scale, config.frames)
+        warn(f"frames are {taken}")
     return decoder
 
 
@@ -297,12 +298,21 @@ def events_from_light(
         table,
         complete,
         given,
-        fired,
         threads=threads,
         coarseness=coarseness,
         causes=causes,
     )
+    if fired is not None:
+        made = _counted(made, fired)
     yield from _limited(map_events(hooks, made, causes), config.max_events)
+
+
+def _counted(made: Iterator[Events], fired: Callable[[int], None]) -> Iterator[Events]:
+    """Yield the events, and tell how many they are."""
+    for events in made:
+        fired(events.size)
+        yield events
+        del events  # or they would stay while the next ones are made
 
 
 def _limited(made: Iterator[Events], most: int) -> Iterator[Events]:
@@ -328,7 +338,6 @@ def _pixel_events(
     table: NDArray[np.float32] | None,
     complete: Callable[[int], None] | None,
     given: GivenFlow | None,
-    fired: Callable[[int], None] | None,
     **options: Any,
 ) -> Iterator[Events]:
     """Yield the sorted events of the pixels, as they are before the readout.
@@ -360,8 +369,6 @@ def _pixel_events(
             if complete is not None:
                 complete(end_us)
             intervals.expect(count)
-            if fired is not None:
-                fired(count)
             for hook in hooks:
                 hook.passed(part.times_ns[-1] * 1e-9)
         yield order.rest()
