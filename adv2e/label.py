@@ -147,7 +147,8 @@ class Seen:
     dtype : dtype
         That of their numbers.
     floor : float, optional
-        Light below which the pixel sees no difference [DN]; None: there is none.
+        Light up to which the pixel sees no difference, in numbers of the light that comes; None:
+        there is none.
     """
 
     def __init__(self, white: float, dtype: np.dtype[Any], floor: float | None = None) -> None:
@@ -161,7 +162,7 @@ class Seen:
         self._values = self._pixels = self._dark = self._repeated = 0
 
     def add(self, t_ns: int, image: NDArray[Any], offset: Any, light: NDArray[Any]) -> None:
-        """Take note of a frame: its time [ns], numbers, place on a path, and light [DN]."""
+        """Take note of a frame: its time [ns], numbers, place on a path, and light."""
         last, place = self._last
         is_equal = image is last or (last is not None and _are_equal(image, last))
         if not is_equal:

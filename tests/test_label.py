@@ -415,14 +415,15 @@ def clips(draw):
 
 
 @pytest.mark.parametrize("draw", [0, 1, 2])
-@pytest.mark.parametrize("threads", [1, 2])
-def test_numbers_of_the_label_are_those_of_the_frames(tmp_path, draw, threads):
+@pytest.mark.parametrize(("threads", "parts"), [(1, 10), (2, 10), (2, 1)])
+def test_numbers_of_the_label_are_those_of_the_frames(tmp_path, draw, threads, parts):
     frames, times_us = clips(draw)
     source = stack(tmp_path, frames)
     (tmp_path / "times.txt").write_text("".join(f"{t}\n" for t in times_us))
     given = {"timestamps": tmp_path / "times.txt", "time_unit": "us", "threads": threads}
     floor = {"pixel": {"log_response": {"linear_below": 0, "floor": 3.0}}}
-    label, _ = converted(source, tmp_path, config=[SAID, floor], **given)
+    config = [SAID, floor, {"sampling": {"L": parts}}]  # with one, the kernel decodes
+    label, _ = converted(source, tmp_path, config=config, **given)
 
     same = sum(a.tobytes() == b.tobytes() for a, b in itertools.pairwise(frames))
     steps = [b - a for a, b in itertools.pairwise(times_us)]

@@ -258,9 +258,6 @@ def convert_reading(
     label.add(taken, *recording.selection.left_out, *recording.doubts, *recording.notes)
     if options["strict"]:
         label.refuse(recording.path, told)
-    response = config.pixel.log_response
-    floor = None if response.linear_below else response.floor
-    noted = Seen(decoder.full_scale, recording.dtype, floor)
     with Staging(options["overwrite"], inputs) as staging, ExitStack() as stack:
         sink = stack.enter_context(
             opening(
@@ -293,6 +290,11 @@ def convert_reading(
             say(text)
         hooks = active_hooks(config, exposures_us=exposures_us)
         table = kernel_table(decoder, config.sampling, hooks, fitting)
+        response = config.pixel.log_response
+        floor = None if response.linear_below else response.floor
+        if table is not None and floor is not None:  # as a value: the kernel decodes
+            floor = int(np.count_nonzero(table <= floor)) - 1
+        noted = Seen(decoder.full_scale, recording.dtype, floor)
         stated = config.frames.full_scale
         decoded = reading.decoded(
             Decoding(
