@@ -294,7 +294,7 @@ def convert_reading(
         floor = None if response.linear_below else response.floor
         if table is not None and floor is not None:  # as a value: the kernel decodes
             floor = int(np.count_nonzero(table <= floor)) - 1
-        noted = Seen(decoder.full_scale, recording.dtype, floor)
+        noted, fired = Seen(decoder.full_scale, recording.dtype, floor), list[int]()
         stated = config.frames.full_scale
         decoded = reading.decoded(
             Decoding(
@@ -303,7 +303,6 @@ def convert_reading(
         )
         if progress:
             decoded = _shown(decoded, recording.count, out, stack)
-        fired: list[int] = []
         chunks = events_from_light(
             out.light_of(decoded),
             config,
