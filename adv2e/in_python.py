@@ -13,6 +13,7 @@ from inspect import isgenerator
 from typing import Any, TypeVar
 
 from adv2e.errors import Adv2eError
+from adv2e.label import Line
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -23,7 +24,8 @@ _OTHER_NAMES = {
 _FLAGS = ("overwrite", "allow_damaged", "rotate180", "with_frames", "causes", "crop_events")
 # a command that is quoted stays as it is typed in a shell
 _OPTION = re.compile(
-    r"'adv2e [^']*'|(?<![\w-])--([a-z][a-z0-9-]*)(?: ([A-Z]+\b|zero\b|frames\b|events\b|\d+\b))?"
+    r"'adv2e [^']*'|(?<![\w-])--([a-z][a-z0-9-]*)"
+    r"(?: ([A-Z]+\b|zero\b|frames\b(?!\.)|events\b|\d+\b))?"
     r"|(?<![\w-])-o OUT\b"
 )
 
@@ -45,7 +47,8 @@ def in_python(text: str, names: Mapping[str, str] | None = None) -> str:
             return name
         return f"{name}={value!r}" if value.islower() else f"{name}={value}"
 
-    return _OPTION.sub(argument, text)
+    made = _OPTION.sub(argument, text)
+    return text.like(made) if isinstance(text, Line) else made
 
 
 def reworded(function: Function) -> Function:

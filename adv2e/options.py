@@ -419,6 +419,20 @@ class Blurred(TypedDict, total=False):
     ]
 
 
+class Strictness(TypedDict, total=False):
+    """Option of guesses."""
+
+    strict: Annotated[
+        bool,
+        Option(
+            help="Make no guess: what an input does not say, and no option or key does, is an"
+            " error that names it.",
+            usual="guesses are told, and in the label that 'adv2e info' shows first",
+            default=False,
+        ),
+    ]
+
+
 class OutputOptions(Content, SideInput, total=False):
     """Options of a file of events that is written."""
 
@@ -437,7 +451,7 @@ class OutputOptions(Content, SideInput, total=False):
     overwrite: Overwrite
 
 
-class SimulatedOutput(OutputOptions, Blurred, total=False):
+class SimulatedOutput(OutputOptions, Blurred, Strictness, total=False):
     """Options of the output of a simulation."""
 
     preview: Annotated[
@@ -472,7 +486,7 @@ class Run(TypedDict, total=False):
     progress: Progress
 
 
-class CopyOptions(EventInput, Clock, OutputOptions, Run, total=False):
+class CopyOptions(EventInput, Clock, OutputOptions, Strictness, Run, total=False):
     """Options of the writing of events in another format."""
 
 
@@ -894,7 +908,9 @@ LAYOUTS = ("auto", "gopro", "ddd17", "davis240c", "images", "videos")
 """Trees of sequences that a batch knows."""
 
 
-class BatchOptions(AnyFrames, Part, Clock, MotionOptions, Content, Blurred, Run, total=False):
+class BatchOptions(
+    AnyFrames, Part, Clock, MotionOptions, Content, Blurred, Strictness, Run, total=False
+):
     """Options of a batch."""
 
     layout: Annotated[str, Option(help="Which sequences count.", default="auto", choices=LAYOUTS)]

@@ -18,34 +18,34 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1680,
-    "batches": 1515,
+    "": 1825,
+    "batches": 1520,
     "cli": 1256,
     "comparison": 1165,
     "compilation": 285,
     "config": 1315,
-    "conversion": 1195,
+    "conversion": 1250,
     "diagnosis": 8320,
     "effects": 1615,
     "exporting": 1075,
     "files": 785,
-    "formats": 5130,
-    "inspection": 260,
+    "formats": 5155,
+    "inspection": 270,
     "kernel": 5940,
-    "light": 890,
+    "light": 895,
     "motion": 370,
     "pixel": 575,
     "process": 265,
     "rendering": 1036,
-    "reports": 1773,
+    "reports": 1775,
     "representations": 145,
-    "side": 860,
-    "sources": 3695,
+    "side": 870,
+    "sources": 3720,
     "synthetic": 160,
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 343
+FILES = 344
 """Most modules of all packages together."""
 
 _SLACK = 60

@@ -422,7 +422,7 @@ def open_batch(
         "format": options["format"],
         "with_frames": options["with_frames"] or (export is not None and export.needs_frames),
         "causes": options["causes"],
-        **{name: options[name] for name in ("side", "blurred_frames") if options[name]},
+        **{name: options[name] for name in ("side", "blurred_frames", "strict") if options[name]},
     }
     suffix = next(iter(format.suffixes))
     if options["no_events"]:

@@ -116,6 +116,7 @@ def _convert(job: Job) -> dict[str, Any]:
             doubt=lambda text: warn(in_python(text)),
             overwrite=True,
             take="frames",
+            source_sha256=source,
             threads=job.threads,
             **how,
         )

@@ -32,6 +32,7 @@ from adv2e.formats.frames import open_frames
 from adv2e.formats.reading import read_events
 from adv2e.formats.recording import Recording
 from adv2e.in_python import in_python
+from adv2e.label import report_of
 from adv2e.light.sensor import check_beside
 from adv2e.options import CompareOptions, EventInput, chosen, declared, takes
 from adv2e.sources import PICTURES, VIDEO_SUFFIXES
@@ -381,6 +382,7 @@ def _stream(stream: Recording) -> dict[str, Any]:
         "events": len(events),
         "first_us": int(events["t"][0]) if len(events) else None,
         "last_us": int(events["t"][-1]) if len(events) else None,
+        "label": report_of(stream.metadata, stream.problems),
     }
 
 

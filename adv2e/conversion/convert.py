@@ -110,6 +110,7 @@ def convert_input(
     ready: Callable[[], None] = lambda: None,
     capturing: str | None = None,
     opening: Opening | None = None,
+    source_sha256: str | None = None,
     **options: Unpack[ConvertOptions],
 ) -> Summary:
     """Do what :func:`convert` does; errors name options of the command line.
@@ -135,6 +136,8 @@ def convert_input(
         What is told where Ctrl-C ends the frames of a pipe; default: it ends the conversion.
     opening : callable, optional
         Opens the output of a simulation; default: a file of events.
+    source_sha256 : str, optional
+        SHA-256 of the source, for the label of a simulation.
     **options
         See :class:`adv2e.options.ConvertOptions`.
     """
@@ -169,6 +172,7 @@ def convert_input(
             also_read=also_read(),
             log=log,
             doubt=doubt,
+            source_sha256=source_sha256,
             **({} if opening is None else {"opening": opening}),
             **chosen(SimulatedOutput, options),
         )

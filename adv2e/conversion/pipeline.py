@@ -37,10 +37,12 @@ from adv2e.errors import DataError, UsageError
 from adv2e.events import Events
 from adv2e.files.regular import shown
 from adv2e.files.staging import Staging, nearest_there, writing
+from adv2e.files.states import digest_of_values
 from adv2e.formats.registry import check_frames, to_write
 from adv2e.formats.writing import PACKAGES, SideFiles, Sink, open_sink
 from adv2e.geometry import Size
-from adv2e.light.decoding import decoder_for, kernel_table, light_text
+from adv2e.label import ENCODING, WHITE, Label, Seen, left_out
+from adv2e.light.decoding import decoder_for, kernel_table, light_line, light_text
 from adv2e.light.interpolation import network_of
 from adv2e.light.pictures import drawn, picture_white
 from adv2e.light.sensor import fitting_of
@@ -183,6 +185,7 @@ def convert_reading(
     log: Callable[[str], None] = lambda text: None,
     doubt: Callable[[str], None] | None = None,
     opening: Opening = open_sink,
+    source_sha256: str | None = None,
     **options: Unpack[SimulatedOutput],
 ) -> Summary:
     """Convert one video, image sequence or recording to events.
@@ -202,6 +205,8 @@ def convert_reading(
         Take lines for people; `doubt` those that ask for a look, by default `log`.
     opening : callable
         Returns what takes the events, as :func:`adv2e.formats.writing.open_sink` does.
+    source_sha256 : str, optional
+        SHA-256 of the source, where it is known.
     **options
         See :class:`adv2e.options.SimulatedOutput`.
 
@@ -211,22 +216,25 @@ def convert_reading(
         For anything wrong with input or output; then no output file is left.
     """
     began = time.perf_counter()
-    doubt = doubt or log
+    say = doubt or log
     recording, workers = reading.source, reading.threads
     exposures_us = recording.exposures_us
     if exposures_us:  # in the place of one for all
         mean_us = float(np.mean(exposures_us))
         config = replace(config, frames=replace(config.frames, exposure_us=mean_us))
     decoder, fitting = decoding_of(recording, config)
+    doubt = label = Label(say, said=_said(config))
+    digests = {"config": digest_of_values(to_dict(config)), "source": source_sha256}
+    label.entries["sha256"] = digests
     format, layout, causes = options["format"], options["layout"], options["causes"]
     target = output or default_output(reading.path, format)
     chosen = to_write(Path(target), format, layout)
     with_frames, preview = options["with_frames"], options["preview"]
     if with_frames:
         check_frames(chosen)
-    keeps_all_bits = chosen.is_davis240c
-    with_frames = with_frames or keeps_all_bits
-    white = picture_white(recording.dtype, decoder.full_scale, not keeps_all_bits)
+    eight_bit = not chosen.is_davis240c
+    with_frames = with_frames or not eight_bit
+    white = picture_white(recording.dtype, decoder.full_scale, eight_bit)
     frames = Size(recording.width, recording.height)
     width, height = frames if fitting is None else fitting.size
     # events and preview come into place together, when all is written
@@ -245,6 +253,11 @@ def convert_reading(
             count, decoder.encoding, white, nearest_there(Path(target).absolute())
         )
     files = _side_files(side, blurred, clock, doubt)
+    taken = light_line(recording.light, recording.full_scale, config.frames)
+    told = _doubt_of_white(recording, recording.largest, config)
+    label.add(taken, *recording.selection.left_out, *recording.doubts, *recording.notes)
+    if options["strict"]:
+        label.refuse(recording.path, told)
     with Staging(options["overwrite"], inputs) as staging, ExitStack() as stack:
         sink = stack.enter_context(
             opening(
@@ -258,6 +271,7 @@ def convert_reading(
                         config, recording, decoder, fitting, white if with_frames else None
                     ),
                     **({"causes": CAUSES} if causes else {}),
+                    "label": label.entries,
                 },
                 with_frames=with_frames,
                 threads=workers,
@@ -272,15 +286,19 @@ def convert_reading(
         seen = _open_preview(preview, width, height, staging, stack)
         work = stack.enter_context(OrderedWork(int(beside), limit=BEHIND_BYTES, count=BEHIND_TASKS))
         out = _Output(sink, seen, blurred, white, work)
-        told = _doubt_of_white(recording, recording.largest, config)
         for text in filter(None, (*recording.doubts, told)):
-            doubt(text)
+            say(text)
         hooks = active_hooks(config, exposures_us=exposures_us)
         table = kernel_table(decoder, config.sampling, hooks, fitting)
+        response = config.pixel.log_response
+        floor = None if response.linear_below else response.floor
+        if table is not None and floor is not None:  # as a value: the kernel decodes
+            floor = int(np.count_nonzero(table <= floor)) - 1
+        noted, fired = Seen(decoder.full_scale, recording.dtype, floor), list[int]()
         stated = config.frames.full_scale
         decoded = reading.decoded(
             Decoding(
-                decoder, table is not None, out.wants_frames, stated, not keeps_all_bits, fitting
+                decoder, table is not None, out.wants_frames, stated, eight_bit, fitting, noted
             )
         )
         if progress:
@@ -294,21 +312,28 @@ def convert_reading(
             complete=out.complete_until,
             causes=causes,
             given=flow,
+            fired=fired.append,
         )
         for events in chunks:
             out.add(events)
             del events  # or they would stay while the next ones are made
         if recording.ended_by_hand is not None:
             sink.describe(ended_by_hand_after_frames=recording.ended_by_hand)
+        found = _doubt_of_white(recording, recording.largest_read, config)
+        label.add(*recording.notes, found)
+        if options["strict"]:  # what only all frames tell
+            label.refuse(recording.path)
+        if (lost := sum(fired) - out.events) > 0:
+            label.add(left_out(f"{lost:,} events that the readout lost"))
+        interpolation = config.sampling.interpolation if config.sampling.L > 1 else "linear"
+        label.entries |= noted.label(interpolation, config.frames.exposure_us)
     # at the end: an error is to be the only line
-    taken = light_text(recording.light, recording.full_scale, config.frames)
-    is_guess = config.frames.encoding == "auto" and recording.light.is_guess
-    (doubt if is_guess else log)(f"frames are {taken}")
+    is_doubtful = config.frames.encoding == "auto" and recording.light.is_doubtful
+    (say if is_doubtful else log)(taken)
     crop = recording.selection.crop
     if crop is not None or fitting is not None:
         part = f" at x {crop.x}, y {crop.y} of the input's" if crop is not None else ""
         log(f"frames are {frames}{part}{f', {fitting.text()}' if fitting is not None else ''}")
-    found = _doubt_of_white(recording, recording.largest_read, config)
     if told:
         largest = f"{recording.path}: whole numbers up to {recording.largest_read:g} came"
         found = "" if found else f"{largest}: what was said of white does not hold"
@@ -322,7 +347,7 @@ def convert_reading(
     if side is not None:
         log("standard output holds no side data" if target == "-" else side.told())
     if found:
-        doubt(found)
+        say(found)
     return Summary(
         output=target,
         width=width,
@@ -434,6 +459,12 @@ def _clock_of(recording: Source, config: Config) -> Clock:
         offset_us=config.frames.clock_offset_us,
         drift_ppm=config.frames.clock_drift_ppm,
     )
+
+
+def _said(config: Config) -> set[str]:
+    """Return the keys of which a configuration says what the numbers of frames stand for."""
+    stated = {ENCODING: config.frames.encoding, WHITE: config.frames.full_scale}
+    return {key for key, value in stated.items() if value not in (None, "auto")}
 
 
 def _doubt_of_white(recording: Source, largest: float | None, config: Config) -> str:

@@ -20,6 +20,7 @@ from adv2e.background import default_threads, read_ahead
 from adv2e.effects.frames.brightness import check_floats, check_light
 from adv2e.errors import Adv2eError, DataError
 from adv2e.formats.frames import open_frames
+from adv2e.label import Seen
 from adv2e.light.pictures import picture_of
 from adv2e.options import SourceOptions, takes
 from adv2e.sources import STDIN
@@ -61,6 +62,8 @@ class Decoding:
         Pictures must be of 8 bits.
     fitting : Fitting, optional
         Fitting of the frames to the sensor; None: they have its size.
+    seen : Seen, optional
+        Takes note of each frame.
     """
 
     decoder: LightDecoder
@@ -69,6 +72,7 @@ class Decoding:
     full_scale: float | None = None
     eight_bit: bool = False
     fitting: Fitting | None = None
+    seen: Seen | None = None
 
     def decoded(self, frame: Frame) -> Decoded:
         """Return a frame decoded for the pixels; DataError if its white is not as configured."""
@@ -90,6 +94,8 @@ class Decoding:
             light = self.decoder.over_black(frame.image, frame.alpha)
         if frame.image.dtype.kind == "f":  # here, where its name is known
             check_light(light, frame.label)
+        if self.seen is not None:
+            self.seen.add(frame.t_ns, frame.image, frame.offset, light)
         return (frame.t_ns, light), picture
 
 

@@ -22,7 +22,8 @@ from adv2e.effects.hooks import Frames, Hooks, LightFrame
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.errors import ConfigError, DataError, UsageError, warn
 from adv2e.events import Events, empty_events
-from adv2e.light.decoding import decoder_for, kernel_table, light_text
+from adv2e.label import Label
+from adv2e.light.decoding import decoder_for, kernel_table, light_line, light_text
 from adv2e.light.intervals import Intervals
 from adv2e.light.sensor import fitting_of
 from adv2e.pixel.array import PixelArray
@@ -51,6 +52,7 @@ def simulate(
     threads: int | None = None,
     causes: bool = False,
     progress: bool = False,
+    strict: bool = False,
 ) -> Iterator[Events]:
     """Return an iterator over the events of a sequence of frames, sorted, chunk by chunk.
 
@@ -79,6 +81,8 @@ def simulate(
         what made it.
     progress : bool
         Show a progress bar on stderr.
+    strict : bool
+        Raise DataError where it must guess what the frames stand for: `frames.encoding` is auto.
 
     Returns
     -------
@@ -126,6 +130,9 @@ def simulate(
     first = next(coming, None)
     if first is None:
         raise DataError("no frames: at least two are needed")
+    if strict:
+        meant = light_of_images(Frame(np.asarray(first)), "arrays")
+        Label().refuse("frames", light_line(meant, 0, config.frames))
     decoder = _decoder_for(np.asarray(first), config)
     rows, columns = np.shape(first)[:2]
     fitting = fitting_of(columns, rows, config.sensor, "frame 0")
@@ -244,7 +251,7 @@ def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
         )
     light = light_of_images(Frame(image), "arrays")
     decoder = decoder_for(config.frames, image.dtype, colour, auto=light.encoding)
-    if config.frames.encoding == "auto" and light.is_guess:
+    if config.frames.encoding == "auto" and light.is_doubtful:
         taken = light_text(light, decoder.full_scale, config.frames)
         warn(f"frames are {taken}")
     return decoder
@@ -261,6 +268,7 @@ def events_from_light(
     complete: Callable[[int], None] | None = None,
     causes: bool = False,
     given: GivenFlow | None = None,
+    fired: Callable[[int], None] | None = None,
 ) -> Iterator[Events]:
     """Yield the events of a sequence of (t_ns, light [DN]), sorted, chunk by chunk.
 
@@ -269,7 +277,8 @@ def events_from_light(
     it decodes.  `coarseness`, `causes`: see :class:`adv2e.pixel.array.PixelArray`.
     `complete` is called now and then with a time [us] before which no event will come any more; not
     so if effects change events, as they may change times.  `given`: see
-    :func:`adv2e.light.interpolation.make_upsampler`.
+    :func:`adv2e.light.interpolation.make_upsampler`.  `fired` is told how many events the pixels
+    make, of which the readout may lose some.
 
     Raises
     ------
@@ -293,7 +302,17 @@ def events_from_light(
         coarseness=coarseness,
         causes=causes,
     )
+    if fired is not None:
+        made = _counted(made, fired)
     yield from _limited(map_events(hooks, made, causes), config.max_events)
+
+
+def _counted(made: Iterator[Events], fired: Callable[[int], None]) -> Iterator[Events]:
+    """Yield the events, and tell how many they are."""
+    for events in made:
+        fired(events.size)
+        yield events
+        del events  # or they would stay while the next ones are made
 
 
 def _limited(made: Iterator[Events], most: int) -> Iterator[Events]:

@@ -28,6 +28,7 @@ from adv2e.formats.reading import events_in_order, open_events, shots_of, wanted
 from adv2e.formats.registry import check_frames, to_write
 from adv2e.formats.writing import PACKAGES, Sink, open_sink
 from adv2e.geometry import Size
+from adv2e.label import Label, left_out
 from adv2e.light.pictures import picture_of, picture_white
 from adv2e.options import CopyOptions, EventInput, chosen, crop_of, takes
 from adv2e.process.bars import share_bar
@@ -90,7 +91,13 @@ def convert_events(
         crop = crop_of(options) or (0, 0, *size)
         origin_us = first_us if options["t0"] == "zero" else 0
         frames = file.shots is not None and (with_frames or keeps_all_bits)
-        side = side_of(file, options["side"], doubt or log)
+        tell = label = Label(doubt or log, facts.description.get("label"))
+        label.add(*facts.problems, *facts.selection.left_out)
+        if options["strict"]:
+            label.refuse(path)
+        kept = {"frames": file.shots is None or frames, "causes": file.causes is None or causes}
+        label.add(*(left_out(name) for name in kept if not kept[name]))
+        side = side_of(file, options["side"], tell)
         clock = partial(clock_of, file, origin_us)
         with Staging(options["overwrite"], file.inputs) as staging, ExitStack() as stack:
             sink = stack.enter_context(
@@ -106,6 +113,7 @@ def convert_events(
                             keeps_all_bits=keeps_all_bits,
                         ),
                         **({"causes": CAUSES} if causes else {}),
+                        "label": label.entries,
                     },
                     format=options["format"],
                     layout=options["layout"],
@@ -113,7 +121,7 @@ def convert_events(
                     threads=options["threads"],
                     staging=staging,
                     causes=causes,
-                    side=None if side is None or output == "-" else side.files(clock, doubt or log),
+                    side=None if side is None or output == "-" else side.files(clock, tell),
                 )
             )
             stored = _write_frames(file, Size(*size), origin_us, sink, keeps_all_bits)

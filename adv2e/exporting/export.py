@@ -25,6 +25,7 @@ from adv2e.files.staging import Staging, writing
 from adv2e.formats.reading import events_in_order
 from adv2e.formats.writing import write_side
 from adv2e.in_python import in_python
+from adv2e.label import report_of
 from adv2e.options import EXPORTS, EventInput, ExportOptions, chosen, takes
 
 DESCRIPTION, FILES = MADE_BY_US
@@ -274,7 +275,11 @@ def _exported(
         doubts = told.pop("doubts")
         entries = sorted([entry.name for entry in folder.iterdir()] + [DESCRIPTION])
         inputs = [
-            {"name": sequence.name, "file": shown(sequence.file.facts.path.name)}
+            {
+                "name": sequence.name,
+                "file": shown(sequence.file.facts.path.name),
+                "label": report_of(sequence.file.facts.description, sequence.file.facts.problems),
+            }
             for sequence in sequences
         ]
         asked = {name: reading.get(name) for name in ("start_s", "stop_s", "crop")}

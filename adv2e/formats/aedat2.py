@@ -52,6 +52,7 @@ from adv2e.formats.binary import Numbers, blocks
 from adv2e.formats.clock import CONTINUE, Clock
 from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.formats.writing import Request, Writer, to_line
+from adv2e.label import guessed, left_out
 from adv2e.sources.frame import Frame, Shot
 
 _CHIPS = {
@@ -109,21 +110,20 @@ def open_aedat2(path: Path, facts: Facts) -> EventFile:
     if facts.geometry is None:
         size, old = _likely(path, begin)
         facts.state(size, "that size")
-        facts.problems.append(
-            f"no chip stated: {'a DVS128' if old else 'a DAVIS'} of {size[0]}x{size[1]} pixels"
-            " taken, the smallest that all addresses fit"
-        )
+        chosen = f"{size[0]}x{size[1]}"
+        told = f"no chip stated: {'a DVS128' if old else 'a DAVIS'} of {chosen} pixels taken, the"
+        told += " smallest that all addresses fit"
+        facts.problems.append(guessed(told, "size", chosen, f"give --size {chosen}, or another"))
     else:
         old = known in _OLD
         size = facts.geometry
     frames = [] if old else _frames(path, begin, size, facts)
     if frames and "color" in chip.lower():
-        facts.problems.append("frames hold a mosaic of colours, taken as grey")
+        facts.problems.append(left_out("frames hold a mosaic of colours, taken as grey"))
     whole = [frame for frame in frames if frame.is_whole]
     if len(whole) < len(frames):
-        facts.problems.append(
-            f"{len(frames) - len(whole)} of {len(frames)} frames are not whole: left out"
-        )
+        told = f"{len(frames) - len(whole)} of {len(frames)} frames are not whole: left out"
+        facts.problems.append(left_out(told))
     shots = [
         Shot(frame.t_ns, f"{path}: frame {number}", partial(_load, path, begin, frame, size))
         for number, frame in enumerate(sorted(whole, key=lambda frame: frame.t_ns))

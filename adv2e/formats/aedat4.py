@@ -34,7 +34,6 @@ References
 from __future__ import annotations
 
 import copy
-import json
 import struct
 from collections import Counter
 from collections.abc import Iterator
@@ -44,7 +43,6 @@ from functools import partial
 from pathlib import Path
 from typing import IO, Any
 from xml.etree import ElementTree
-from xml.sax.saxutils import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +53,8 @@ from adv2e.files.backlog import Backlog
 from adv2e.files.regular import expand
 from adv2e.formats.clock import shots_in_order
 from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry, joined
-from adv2e.formats.writing import Pieces, Request, Writer
+from adv2e.formats.writing import Pieces, Request, Writer, to_line
+from adv2e.label import left_out
 from adv2e.light.pictures import eight_bit
 from adv2e.sources.frame import Frame, Shot, Track, counted
 from adv2e.ticks import US, check_time, check_us
@@ -357,9 +356,8 @@ def _packets(
         number, size = struct.unpack("<ii", start) if len(start) == 8 else (0, 0)
         if at + 8 > head.end or len(start) < 8 or (size >= 0 and at + 8 + size > head.end):
             if head.interrupted:
-                problem = "the recording was interrupted: its last packet is cut, left out"
-                if problem not in facts.problems:
-                    facts.problems.append(problem)
+                told = "the recording was interrupted: its last packet is cut, left out"
+                facts.tell(left_out(told))
                 return
             raise DataError(f"{label}: states {size:,} bytes, more than there are: damaged")
         if number not in known or size < 0:
@@ -492,7 +490,7 @@ class Aedat4Writer(Writer):
     def _xml(self) -> Iterator[str]:
         streams = [("events", "EVTS"), ("frames", "FRME")][: 1 + self._request.with_frames]
         compression = "NONE" if self._lz4 is None else "LZ4"
-        about = json.dumps(self._request.description, allow_nan=False)
+        about = to_line(self._request.description)
         yield '<dv version="2.0"><node name="outInfo" path="/outInfo/">'
         for number, (name, kind) in enumerate(streams):
             path = f"/outInfo/{number}/"
@@ -508,7 +506,7 @@ class Aedat4Writer(Writer):
             yield f'<attr key="sizeY" type="int">{self._request.height}</attr>'
             yield '<attr key="source" type="string">adv2e</attr>'
             if number == _EVENT_STREAM:
-                yield f'<attr key="adv2e" type="string">{escape(about)}</attr>'
+                yield f'<attr key="adv2e" type="string">{about}</attr>'
             yield "</node></node>"
         yield "</node></dv>\n"
 

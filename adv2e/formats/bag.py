@@ -67,6 +67,7 @@ from adv2e.formats.binary import DECODERS
 from adv2e.formats.clock import shots_in_order
 from adv2e.formats.event_file import MOST_COLUMNS, Columns, EventFile, Facts, joined
 from adv2e.formats.writing import Pieces, Request, Writer, to_json
+from adv2e.label import left_out
 from adv2e.light.pictures import eight_bit
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.frame import Frame, Shot, Track, counted
@@ -182,12 +183,12 @@ class PacketReader:
 
     Parameters
     ----------
-    problems : list of str
-        Is added what is to be told.
+    tell : callable
+        Takes what is to be told; packets may be read more than once.
     """
 
-    def __init__(self, problems: list[str]) -> None:
-        self._problems = problems
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        self._tell = tell
         self._decoder: Any = None
         self._shift_us: int | None = None
         self._number: int | None = None
@@ -243,17 +244,13 @@ class PacketReader:
         elif lost > 0:  # and with them, perhaps, turns of the clock
             turn = 1 << self._decoder.bits
             self._shift_us += round((stamp_us - first - self._shift_us) / turn) * turn
-            self._tell(f"{label}: {lost:,} packets before it are missing")
+            self._tell(left_out(f"{label}: {lost:,} packets before it are missing", "packets"))
         return t + self._shift_us, x, y, p
 
     def end(self) -> None:
         """Report the problems of all packets."""
         for text in self._decoder.problems() if self._decoder is not None else ():
             self._tell(text)
-
-    def _tell(self, text: str) -> None:
-        if text not in self._problems:  # packets may be read more than once
-            self._problems.append(text)
 
 
 def _of_mono(words: NDArray[np.uint64], stamp_ns: int) -> Columns:
@@ -423,7 +420,7 @@ class _Bag:
     """
 
     def __init__(self, path: Path, facts: Facts) -> None:
-        self._path, self._reader, self._problems = path, None, facts.problems
+        self._path, self._reader, self._tell = path, None, facts.tell
         self.is_ros1 = path.suffix.lower() == ".bag"
         with _reading(path):
             self._reader = _opened(path, self.is_ros1)
@@ -464,7 +461,7 @@ class _Bag:
         """Yield the messages of events."""
         if self._events is None:
             return
-        packets = PacketReader(self._problems) if self._events.holds in _PACKETS else None
+        packets = PacketReader(self._tell) if self._events.holds in _PACKETS else None
         read: Callable[[bytes, bool, str], EventMessage] = packets or read_event_array
         for number, (_, data) in enumerate(self._messages(self._events)):
             label = f"{self._path}: {self._events.name} message {number}"
@@ -665,12 +662,12 @@ class Ros2Writer(_BagWriter):
         self._folder = path / (self._request.path.name or "bag")
         plugin = rosbag2.StoragePlugin.MCAP
         bag = rosbag2.Writer(self._folder, version=8, storage_plugin=plugin)
-        bag.set_custom_data("adv2e", to_json(self._request.description))
         bag.open()
         return bag
 
     def finish(self) -> None:
         """Write the remaining events and frames, and close the bag."""
+        self._bag.set_custom_data("adv2e", to_json(self._request.description))
         super().finish()
         for file in sorted(self._folder.iterdir()):
             file.rename(self._folder.parent / file.name)

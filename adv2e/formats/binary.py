@@ -21,6 +21,7 @@ from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.formats.event_file import Column, Columns, EventFile, Facts, described_geometry
 from adv2e.formats.writing import Request, Writer, to_line
+from adv2e.label import left_out
 from adv2e.ticks import US, check_time
 
 # ---- Files that are a stream of words: read in blocks, and times of few bits counted on.
@@ -58,10 +59,10 @@ def blocks(
             if facts is None:
                 continue
             if left:
-                facts.problems.append(
+                told = (
                     f"{left} bytes at the end, at byte {file.tell() - left}, are no whole word of"
-                    f" {word.itemsize}: left out"
                 )
+                facts.problems.append(left_out(f"{told} {word.itemsize}: left out"))
             facts.progress(file.tell(), total)
 
 
@@ -140,16 +141,16 @@ class Kinds:
 
     def problems(self) -> list[str]:
         """Return the problems of all words until now."""
-        told = []
+        told: list[str] = []
         if self.early:
-            told.append(f"{self.early} events without a time, row or column before them: left out")
+            early = f"{self.early} events without a time, row or column before them: left out"
+            told.append(left_out(early))
         odd = [kind for kind in np.flatnonzero(self._counts) if kind not in self._known]
         if odd:
             names = ", ".join(f"{kind:#x}" for kind in odd)
-            told.append(
-                f"{self._counts[odd].sum()} of {self._total} words of a kind that the format"
-                f" does not have ({names}): left out"
-            )
+            count = f"{self._counts[odd].sum()} of {self._total} words"
+            line = f"{count} of a kind that the format does not have ({names}): left out"
+            told.append(left_out(line))
         return told
 
 
@@ -334,7 +335,8 @@ def open_es(path: Path, facts: Facts) -> EventFile:
                 yield times, x, height - 1 - y, events[:, 0] & 1
                 facts.progress(file.tell(), total)
         if rest:
-            facts.problems.append(f"the last {len(rest)} bytes are no whole event: left out")
+            told = f"the last {len(rest)} bytes are no whole event: left out"
+            facts.problems.append(left_out(told))
 
     return EventFile("es", facts, parts)
 

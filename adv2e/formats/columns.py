@@ -45,7 +45,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
-from adv2e.sources.times.rates import SETTLED, UNITS, Unit, are_dates
+from adv2e.sources.times.rates import SETTLED, UNITS, Unit, are_dates, guessed_unit
 
 FEW = 20
 """Number of events below which nothing can be told about their columns."""
@@ -279,4 +279,4 @@ def _are_fine(times: NDArray[Any]) -> bool:
 def _taken(unit: str, rate_hz: float | None = None) -> str:
     """Return the note on events whose unit is a guess."""
     rate = "" if rate_hz is None else f", {rate_hz:.3g} events a second"
-    return f"no unit is stated: times are taken as {unit}{rate}; {SETTLED}"
+    return guessed_unit(f"no unit is stated: times are taken as {unit}{rate}; {SETTLED}", unit)

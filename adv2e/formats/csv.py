@@ -42,6 +42,7 @@ from adv2e.formats.columns import find_columns, geometry_in, stated_unit, told_o
 from adv2e.formats.event_file import EventFile, Facts, described_geometry
 from adv2e.formats.text import Form, events_of_lines
 from adv2e.formats.writing import Request, Writer
+from adv2e.label import guessed
 
 _HEADING = b"t,x,y,p"
 _CAUSE = "cause"
@@ -68,7 +69,9 @@ def open_csv(path: Path, facts: Facts) -> EventFile:
         begin = file.read(_MOST_HEADING)
     names, skipped, lines = _heading(path, begin)
     if not re.search(rb"[a-zA-Z]", begin[:skipped]):
-        facts.tell(f"no line names the columns: they are taken as {','.join(names)}, as they tell")
+        taken = ",".join(names)
+        told = f"no line names the columns: they are taken as {taken}, as they tell"
+        facts.tell(guessed(told, "columns", taken, "put a line that names them before the events"))
     comments = begin[:skipped].decode("utf-8", "replace")
     facts.state(geometry_in("".join(re.findall("^#.*\n", comments, re.M)))[1], "a comment")
     found = find_columns(names, str(path))

@@ -52,6 +52,7 @@ from adv2e.formats.event_file import EventFile, Facts
 from adv2e.formats.text import lines_of
 from adv2e.formats.text_writer import blocks_of, formatted, text_blocks
 from adv2e.formats.writing import Request, Writer, listed_side, to_json, write_side
+from adv2e.label import told_of
 from adv2e.sources.frame import Frame, Shot
 from adv2e.sources.images.opencv import decode_image
 from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST
@@ -101,7 +102,7 @@ def open_davis240c(path: Path, facts: Facts) -> EventFile:
         return replace(text_file, layout="davis240c" if name == EVENTS else "text")
     if unit := facts.unit_of_frames(whole=listed.whole):
         listed = _listed(files, time_unit=unit) or listed
-    facts.problems += [f"{LIST}: {line}" for line in (listed.unit.doubt, listed.order) if line]
+    facts.problems += [told_of(LIST, line) for line in (listed.unit.doubt, listed.order) if line]
     names = members_of(listed.stamps, files.label(LIST), files.has)
     shots = [
         Shot(stamp.t_ns, files.label(member), partial(_image, files, member))

@@ -53,6 +53,7 @@ from adv2e.formats import hdf5
 from adv2e.formats.clock import CONTINUE, Clock
 from adv2e.formats.event_file import Columns, EventFile, Facts
 from adv2e.formats.hdf5_layouts import Layout
+from adv2e.label import guessed, left_out
 from adv2e.sources.frame import Frame, Shot
 from adv2e.ticks import S
 
@@ -101,10 +102,9 @@ def open_ddd(path: Path, facts: Facts) -> EventFile:
     with hdf5.opened(path) as file:
         facts.uncarried += [*seen.uncarried, *(name for name in file if name != "dvs")]
     if first is None:
-        facts.problems.append(
-            f"no frame tells the size of the sensor: {_SIZE[0]}x{_SIZE[1]} taken, as in all of"
-            " DDD17 and DDD20"
-        )
+        size = f"{_SIZE[0]}x{_SIZE[1]}"
+        told = f"no frame tells the size of the sensor: {size} taken, as in all of DDD17 and DDD20"
+        facts.problems.append(guessed(told, "size", size, f"give --size {size}"))
         facts.state(_SIZE, "DDD17")
         shots = None
     else:
@@ -132,7 +132,7 @@ def _tell_upside_down(facts: Facts) -> None:
 def _events(path: Path, facts: Facts) -> Iterator[Columns]:
     """Yield the events, and tell what was wrong with them."""
     waiting: list[tuple[NDArray[np.int64], NDArray[np.uint32]]] = []
-    held = left_out = 0
+    held = invalid = 0
     clock = _Clock(facts)
     for packet in _packets(path, facts):
         if packet.kind == _SPECIAL:
@@ -140,7 +140,7 @@ def _events(path: Path, facts: Facts) -> Iterator[Columns]:
         elif packet.kind == _POLARITY and len(packet.items):
             times, words = clock.times(packet), _words(packet, 0).view("<u4")
             valid = words & 1 == 1
-            left_out += words.size - int(np.count_nonzero(valid))
+            invalid += words.size - int(np.count_nonzero(valid))
             waiting.append((times[valid], words[valid]))
             held += words.size
         if held >= hdf5.PART:
@@ -148,8 +148,8 @@ def _events(path: Path, facts: Facts) -> Iterator[Columns]:
             waiting, held = [], 0
     if waiting:
         yield _columns(waiting)
-    if left_out:
-        facts.tell(f"{left_out} events are marked as invalid: left out")
+    if invalid:
+        facts.tell(left_out(f"{invalid} events are marked as invalid: left out"))
     clock.tell()
 
 

@@ -14,6 +14,7 @@ from adv2e.files.zips import Members
 from adv2e.formats.event_file import EventFile
 from adv2e.formats.reading import open_events, shots_of
 from adv2e.formats.registry import format_of, may_hold_events
+from adv2e.label import told_of
 from adv2e.options import SourceOptions, takes
 from adv2e.sources import STDIN, open_source
 from adv2e.sources.base import GivenTimes, Selection, Source
@@ -51,7 +52,7 @@ def open_frames(path: str | Path, **options: Unpack[SourceOptions]) -> Source:
 def _source(file: EventFile, given: GivenTimes, selection: Selection) -> Source:
     """Return the frames of an event file as a source."""
     path = file.facts.path
-    times = Timed(list(shots_of(file)), [f"{path}: {line}" for line in file.facts.problems], [])
+    times = Timed(list(shots_of(file)), [told_of(path, line) for line in file.facts.problems], [])
     if given:
         pictures = [Picture(shot.label, None, shot.load) for shot in times.shots]
         times = timed(given, pictures, path, str(path))

@@ -21,6 +21,7 @@ from adv2e.errors import DataError
 from adv2e.formats import hdf5
 from adv2e.formats.clock import unwrapped
 from adv2e.formats.event_file import Columns, EventFile, Facts
+from adv2e.label import told_of
 from adv2e.sources.frame import Frame, Shot
 from adv2e.sources.times.rates import Unit, frame_unit
 from adv2e.ticks import NS, US, S, to_ticks
@@ -292,7 +293,7 @@ class _Images:
         """Return the frames, once the unit of the times of the events is known."""
         unit = self._unit(facts.unit_of_frames(whole=self._whole), facts.stated_unit)
         if unit.doubt:
-            facts.problems.append(f"{self._group}: {unit.doubt}")
+            facts.problems.append(told_of(self._group, unit.doubt))
         shots = []
         for name, stamp in zip(self._names, self._stamps, strict=True):
             (t_ns,) = to_ticks(stamp, unit.ns, NS, f"{path}: /{name}: {self._attribute}").tolist()

@@ -42,6 +42,7 @@ from adv2e.formats.event_file import (
 from adv2e.formats.recording import Recording
 from adv2e.formats.registry import format_of
 from adv2e.geometry import MOST_PIXELS, Size
+from adv2e.label import guessed, left_out
 from adv2e.options import EventInput, size_of, takes
 from adv2e.process.machine import machine_complaint
 from adv2e.sources.base import Selection
@@ -207,6 +208,7 @@ _STRAY = 1000
 """Events of which one may have an impossible polarity."""
 _MOST_OUTSIDE = 0.01
 """Share of the events that may lie outside the sensor: stray ones."""
+_POLARITY = "write polarities as 0 and 1"
 _FEW = 100
 """Number of events below which they may well lie in a small part of the recording."""
 _APART = 300
@@ -283,12 +285,13 @@ class Survey:
         if self._unstorable:
             self._tell_outside(self._unstorable, "with a coordinate below 0 or above 65535")
         if self._odd:
-            self._facts.tell(
-                f"{self._odd} events with a polarity other than -1, 0 and 1:"
-                " taken as ON above 0, else OFF"
+            told = (
+                f"{self._odd} events with a polarity other than -1, 0 and 1: taken as ON above 0,"
             )
+            self._facts.tell(guessed(f"{told} else OFF", "polarity", "ON above 0", _POLARITY))
         if {-1, 0} <= self._signs:
-            self._facts.tell("polarities -1 and 0 both occur: both taken as OFF")
+            told = "polarities -1 and 0 both occur: both taken as OFF"
+            self._facts.tell(guessed(told, "polarity", "-1 and 0 are OFF", _POLARITY))
         size = self._size()
         if self._outside and size == self._facts.geometry:
             where = f"outside {size[0]}x{size[1]}, which {self._facts.stated_by} states"
@@ -346,7 +349,7 @@ class Survey:
             raise DataError(
                 f"{self._facts.path}: {told}, of {self.count}{hint}: --crop-events leaves them out"
             )
-        self._facts.tell(f"{told}: left out")
+        self._facts.tell(left_out(f"{told}: left out"))
 
     def _size(self) -> tuple[int, int]:
         facts, needed = self._facts, self._needed
@@ -356,16 +359,16 @@ class Survey:
             return stated or (0, 0)
         size = f"{needed[0]}x{needed[1]}"
         if stated is None:
-            facts.tell(f"no geometry stated: {size} from the largest coordinates")
+            told = f"no geometry stated: {size} from the largest coordinates"
+            facts.tell(guessed(told, "size", size, f"give --size {size}, or that of the sensor"))
             return needed
         wider = max(stated[0], needed[0]), max(stated[1], needed[1])
         if wider == stated or wider[0] > stated[0] + 1 or wider[1] > stated[1] + 1:
             return stated
         # a known fault of writers: the largest coordinate in place of the size
-        facts.tell(
-            f"{by} states {stated[0]}x{stated[1]}, one less than the largest coordinates need:"
-            f" {wider[0]}x{wider[1]} taken"
-        )
+        told = f"{by} states {stated[0]}x{stated[1]}, one less than the largest coordinates need:"
+        size = f"{wider[0]}x{wider[1]}"
+        facts.tell(guessed(f"{told} {size} taken", "size", size, f"give --size {size}"))
         return wider
 
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from adv2e.errors import DataError
 from adv2e.formats.columns import geometry_in, order_of
 from adv2e.formats.event_file import Columns, EventFile, Facts
+from adv2e.label import guessed
 from adv2e.sources.stored import DESCRIPTION, EVENTS
 from adv2e.ticks import LARGEST_NS, US, check_time
 
@@ -132,10 +133,9 @@ def _form_of(block: bytes, facts: Facts) -> Form:
     if order == "txyp":
         return Form()
     names = " ".join({"t": "time", "p": "polarity"}.get(name, name) for name in order)
-    facts.tell(
-        f"columns are taken as {names}: column {order.index('t') + 1} alone rises, and column"
-        f" {order.index('p') + 1} alone holds but -1, 0 and 1"
-    )
+    told = f"columns are taken as {names}: column {order.index('t') + 1} alone rises, and column"
+    told += f" {order.index('p') + 1} alone holds but -1, 0 and 1"
+    facts.tell(guessed(told, "columns", names, "write them as time x y polarity"))
     return Form(f"'{names}'", order=tuple(order.index(name) for name in "txyp"))
 
 

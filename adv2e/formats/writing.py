@@ -51,6 +51,12 @@ _ZLIB = b"\x78\x01"
 _STORED, _WINDOW, _PROBE = 0xFFFF, 1 << 15, 1 << 10
 """Most bytes of a stored block of deflate; how far it looks back; bytes of a part looked at."""
 
+_ROOM = 4096
+"""Blanks behind a description with which a file begins."""
+
+_HEAD = 1 << 20
+"""Bytes at the beginning of a file that hold a description, or none does."""
+
 _NO_FRAMES = (
     "the frames of the recording are not written: 'adv2e convert IN -o OUT --from events"
     " --with-frames' keeps them"
@@ -376,6 +382,7 @@ class Sink:
                 if self._causes is not None:
                     self._lines = stack.enter_context(self._causes.open("wb"))
                 made = writer(stack, *temporary)
+            begun = to_line(self._description).encode()
             yield made
             with writing(self._name):
                 made.finish()
@@ -386,6 +393,18 @@ class Sink:
                     text = to_json(self._description)
                     self._described.write_text(text, encoding="utf-8", newline="\n")
                 stack.close()
+                for path in temporary[:1]:
+                    self._describe_again(path, begun)
+
+    def _describe_again(self, path: Path, begun: bytes) -> None:
+        """Write the description at the begin of a file anew, with what is known only now."""
+        now = to_line(self._description).rstrip().encode()
+        if path.is_file() and len(now) <= len(begun):
+            with path.open("r+b") as file:
+                at = file.read(len(begun) + _HEAD).find(begun)
+                if at >= 0:
+                    file.seek(at)
+                    file.write(now.ljust(len(begun)))
 
     def write_events(self, events: Events) -> None:
         """Append events; over all calls they are sorted by time.
@@ -420,10 +439,7 @@ class Sink:
                 self._writer.write_frame(t_ns, image)
 
     def describe(self, **more: Any) -> None:
-        """Add to the description what is known only at the end.
-
-        Formats that begin with it do not hold that: AEDAT, bags of ROS 2, and .raw and .dat.
-        """
+        """Add to the description what is known only at the end."""
         self._description.update(more)
 
     def __enter__(self) -> Sink:
@@ -487,8 +503,14 @@ def to_json(description: dict[str, Any]) -> str:
 
 
 def to_line(description: dict[str, Any]) -> str:
-    """Return the description as one line of ASCII."""
-    return json.dumps(json.loads(to_json(description)))
+    """Return the description as one line of ASCII, with room for more behind it.
+
+    It holds no letter that means something in XML.
+    """
+    line = json.dumps(json.loads(to_json(description)))
+    for letter in "&<>":
+        line = line.replace(letter, f"\\u{ord(letter):04x}")
+    return line + " " * _ROOM
 
 
 def compress(array: NDArray[Any]) -> bytes:

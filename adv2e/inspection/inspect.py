@@ -17,7 +17,8 @@ from adv2e.files.regular import check_ends, shown
 from adv2e.files.zips import Members
 from adv2e.formats.reading import Recording, read_events
 from adv2e.formats.registry import may_hold_events
-from adv2e.light.decoding import light_text
+from adv2e.label import Label
+from adv2e.light.decoding import light_line, light_text
 from adv2e.options import EventInput, InfoOptions, SourceOptions, chosen, declared, takes
 from adv2e.sources import OPENERS, PICTURES, STDIN, Source, open_source
 from adv2e.sources.frame import Light
@@ -50,8 +51,8 @@ def info(
     Returns
     -------
     dict
-        ``file``, ``layout``, ``width``, ``height``, ``events`` (None without), ``frames`` (None
-        without), ``problems``, ``notes``, ``metadata``: always all of them.
+        ``file``, ``label`` (None without), ``layout``, ``width``, ``height``, ``events`` (None
+        without), ``frames`` (None without), ``problems``, ``notes``, ``metadata``: always all.
 
     Raises
     ------
@@ -115,6 +116,7 @@ def _of_recording(recording: Recording) -> dict[str, Any]:
             frames.update(_light(recording.light, white))
     return {
         "file": shown(recording.path),
+        "label": recording.metadata.get("label"),
         "layout": recording.layout,
         "width": recording.width,
         "height": recording.height,
@@ -122,7 +124,7 @@ def _of_recording(recording: Recording) -> dict[str, Any]:
         "frames": frames,
         "problems": [*recording.problems, *oddities_of(recording.events, *size)],
         "notes": [],
-        "metadata": recording.metadata,
+        "metadata": {key: one for key, one in recording.metadata.items() if key != "label"},
     }
 
 
@@ -141,8 +143,11 @@ def _of_source(source: Source, progress: Callable[[int, int | None], None]) -> d
         progress(len(times), source.count)
     times_ns = np.array(times, np.int64)
     doubt = source.doubt_of_white(source.largest_read)  # known once all frames were read
+    label = Label()
+    label.add(light_line(source.light, source.full_scale), *source.doubts, *source.notes, doubt)
     return {
         "file": shown(source.path),
+        "label": label.entries,
         "layout": source.kind,
         "width": source.width,
         "height": source.height,

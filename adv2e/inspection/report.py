@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from adv2e.files.regular import shown
+from adv2e.label import rows_of
 from adv2e.sources.times.rates import seconds
 
 _WIDTH = 12
@@ -18,6 +19,8 @@ def text(report: dict[str, Any]) -> str:
 
 def _rows(report: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "file", report["file"]
+    if report["label"] is not None:
+        yield from rows_of(report["label"])
     yield "layout", report["layout"]
     yield "pixels", f"{report['width']} x {report['height']}"
     if report["events"] is not None:

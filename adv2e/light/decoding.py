@@ -10,6 +10,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from adv2e.effects.composition import overrides
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
+from adv2e.label import ENCODING, guessed
 
 if TYPE_CHECKING:  # 'adv2e info' does without the configuration, which takes time to import
     from adv2e.config.model import Frames, Sampling
@@ -64,3 +65,11 @@ def light_text(light: Light, white: float, frames: Frames | None = None) -> str:
     elif light.full_scale_reason:
         why.append(f"white {light.full_scale_reason}")
     return f"{encoding}, white {full_scale or white:g} ({'; '.join(why)})"
+
+
+def light_line(light: Light, white: float, frames: Frames | None = None) -> str:
+    """Return the line that tells :func:`light_text`, which tells a guess where it is one."""
+    line = f"frames are {light_text(light, white, frames)}"
+    if light.is_stated or (frames and frames.encoding != "auto"):
+        return line
+    return guessed(line, ENCODING, light.encoding, why=light.encoding_reason)

@@ -20,6 +20,7 @@ from adv2e.config.yaml12 import scalar_text
 from adv2e.errors import Adv2eWarning, DataError, OutputError
 from adv2e.files.regular import read_text, shown
 from adv2e.files.staging import Staging, nearest_there
+from adv2e.label import report_of
 from adv2e.process import signals
 from adv2e.reports.markup import plain, unit_of
 from adv2e.reports.page import page
@@ -211,6 +212,7 @@ def _further(diagnosis: Diagnosis) -> dict[str, Any]:
         "masked": list(map(vars, diagnosis.masked)),
         "split": diagnosis.split,
         "notes": diagnosis.notes,
+        "label": report_of({}, diagnosis.notes),
         "facts": diagnosis.facts,
     }
 

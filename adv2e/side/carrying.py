@@ -15,6 +15,7 @@ from adv2e.errors import DataError
 from adv2e.files.regular import beside, shown
 from adv2e.files.zips import Members
 from adv2e.formats.writing import SIDE
+from adv2e.label import left_out, told_of
 from adv2e.side import boxes, maps
 from adv2e.side.calibration import parse_calibration
 from adv2e.side.placement import Clock, Placement
@@ -104,7 +105,7 @@ class SideData:
             try:
                 yield from kind.written(self.place, known)
             except DataError as error:  # noqa: PERF203 - the others are carried
-                tell(f"{error}: not carried")
+                tell(left_out(f"{error}: not carried", name))
                 del self.labels[name]
 
     def told(self) -> str:
@@ -151,7 +152,7 @@ def find_side(
             except DataError as error:  # noqa: PERF203 - the others are carried
                 if given is not None:
                     raise
-                tell(f"{error}: not carried")
+                tell(left_out(f"{error}: not carried", kind))
         if len(found.labels) > before or names.files.names("mav0"):
             found.rest += names.rest(found, Path(source).name)
     boxed = _boxes_beside(Path(source))
@@ -165,7 +166,8 @@ def find_side(
         tell(line)
     if found.rest:
         more = f" and {len(found.rest) - 6} more" if len(found.rest) > 6 else ""
-        tell(f"{source}: not carried: {', '.join(map(shown, found.rest[:6]))}{more}")
+        told = f"not carried: {', '.join(map(shown, found.rest[:6]))}{more}"
+        tell(told_of(source, left_out(told)))
     return found if found.labels else None
 
 

@@ -25,6 +25,7 @@ from decimal import Decimal
 import numpy as np
 
 from adv2e.errors import DataError
+from adv2e.label import Line, guessed, left_out, told_of
 from adv2e.side.placement import Clock, Placement
 from adv2e.sources.times.rates import NUMBER, SETTLED, UNITS, frame_unit, nine_decimals, parse_ns
 
@@ -125,7 +126,8 @@ def parse_table(text: str, label: str, kind: str) -> Table:
     left = [word for at, word in enumerate(names) if at not in columns]
     left = [re.sub(r"\[.*", "", word) for word in left if not _COUNTS.fullmatch(word)]
     if left:
-        told.append(f"{label}: columns that are not carried: {', '.join(left)}")
+        line = f"columns that are not carried: {', '.join(left)}"
+        told.append(told_of(label, left_out(line, f"{kind}: {line}")))
     return Table(kind, label, times, values, told)
 
 
@@ -137,8 +139,10 @@ def unit_of(times: Sequence[str], stated: str | None, label: str) -> tuple[int, 
     if stated is not None or any("." in time for time in times):
         return UNITS[stated or "s"], []
     unit = frame_unit(list(map(Decimal, times)))
-    doubt = unit.doubt.replace(SETTLED, "a heading such as 'time [ns]' settles it")
-    return unit.ns, [f"{label}: {doubt}"] if doubt else []
+    how = "a heading such as 'time [ns]' settles it"
+    doubt = unit.doubt.replace(SETTLED, how)
+    told = guessed(doubt, "time unit", unit.name, how) if isinstance(unit.doubt, Line) else doubt
+    return unit.ns, [told_of(label, told)] if doubt else []
 
 
 def _fields(line: str) -> list[str]:

@@ -24,6 +24,7 @@ from adv2e.effects.frames.brightness import doubt_of_white
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError, UsageError
 from adv2e.geometry import Rectangle, Size
+from adv2e.label import ENCODING, WHITE, guessed, left_out, told_of
 from adv2e.options import EventInput, FrameInput, SourceOptions, crop_of
 from adv2e.sources.frame import (
     OVER_BLACK,
@@ -148,10 +149,8 @@ class Source(ABC):
         self.colour = image.ndim == 3
         across, down = first.densities
         if across != down:
-            self.notes.append(
-                f"{label}: its pixels are not square, as it states {across} across and {down} down;"
-                " they are taken as square"
-            )
+            told = f"its pixels are not square, as it states {across} across and {down} down;"
+            self.notes.append(told_of(label, left_out(f"{told} they are taken as square")))
         self._light_is_stated = light is None
         light = light or light_of_images(first)
         if first.encoding not in ("", light.encoding):
@@ -195,7 +194,9 @@ class Source(ABC):
         decoded = self.kind == "video" and self.dtype == np.uint8
         if largest is None or known or decoded:
             return ""
-        return doubt_of_white(largest, self.dtype, self.path)
+        told = doubt_of_white(largest, self.dtype, self.path)
+        why = "all that was seen is far below it"
+        return told and guessed(told, WHITE, int(full_scale_of(self.dtype)), why=why)
 
     @abstractmethod
     def shots(self) -> Iterator[Shot]:
@@ -275,10 +276,9 @@ class Source(ABC):
         if frame.alpha is not None or frame.composed:
             self._note(OVER_BLACK)
         if self._light_is_stated and light_of_images(frame).encoding != self.encoding:
-            self._note(
-                "not all frames state the same encoding as the first, such as"
-                f" {label}; all are taken as {self.encoding}"
-            )
+            line = f"not all frames state the same encoding as the first, such as {label}; all are"
+            taken, why = self.encoding, "not all frames state the same encoding"
+            self._note(guessed(f"{line} taken as {taken}", ENCODING, taken, why=why))
         if self.largest_read == 0 or self.doubt_of_white(self.largest_read):
             self.largest_read = max(self.largest_read, float(image.max()))
         odd = "" if self._white_told is not None else odd_white(frame, self._white_stated)
@@ -392,6 +392,13 @@ class Selection:
     def is_timed(self) -> bool:
         """A part of the time is wanted."""
         return self.start_s is not None or self.stop_s is not None
+
+    @property
+    def left_out(self) -> list[str]:
+        """What is left out before and after the time that is wanted, as a line, if there is any."""
+        ends = {"before": self.start_s, "after": self.stop_s}
+        told = [f"{side} {end:g} s" for side, end in ends.items() if end is not None]
+        return [left_out(f"what is {' and '.join(told)} from the begin")] if told else []
 
     def of_frame(self, frame: Frame) -> Frame:
         """Return the selected part of a frame, upright, without the rest in memory."""

@@ -24,7 +24,7 @@ _SMALLEST = 4
 
 def light_of(pattern: str) -> Light:
     """Return the encoding of a mosaic: linear light."""
-    return Light("linear", f"a mosaic of {pattern}")
+    return Light("linear", f"a mosaic of {pattern}", is_stated=True)
 
 
 def in_colour(shot: Shot, pattern: str) -> Shot:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from adv2e.effects.frames.encoding import encoding_of_images, full_scale_of
 from adv2e.errors import DataError
+from adv2e.label import guessed
 from adv2e.sources.paths import Offset
 
 Image = NDArray[Any]
@@ -98,7 +99,9 @@ class Light:
         Number that means white, whatever the files of the frames say of it.
     full_scale_reason : str
         Empty where the reason is the same, or the data type says it.
-    is_guess : bool
+    is_stated : bool
+        Their file, or the user, says the encoding; else it is a guess.
+    is_doubtful : bool
         Such numbers stand for other light nearly as often.
     """
 
@@ -106,7 +109,8 @@ class Light:
     encoding_reason: str
     full_scale: float | None = None
     full_scale_reason: str = ""
-    is_guess: bool = False
+    is_stated: bool = False
+    is_doubtful: bool = False
 
 
 @dataclass(frozen=True)
@@ -151,14 +155,14 @@ def light_of_images(frame: Frame, name: str = "images") -> Light:
     photo editors alike.
     """
     if frame.encoding:
-        return Light(frame.encoding, frame.says)
+        return Light(frame.encoding, frame.says, is_stated=True)
     dtype, colour = frame.image.dtype, frame.image.ndim == 3
     depth = "floating-point" if dtype.kind == "f" else f"{8 * dtype.itemsize}-bit"
     reason = f"{depth} {'colour' if colour else 'grey'} {name}"
     if frame.says:
         reason += f"; {frame.says}"
-    is_guess = dtype.kind != "f" and not (colour and dtype == np.uint8)
-    return Light(encoding_of_images(dtype), reason, is_guess=is_guess)
+    is_doubtful = dtype.kind != "f" and not (colour and dtype == np.uint8)
+    return Light(encoding_of_images(dtype), reason, is_doubtful=is_doubtful)
 
 
 def check_values(image: Image, label: str) -> None:
@@ -318,7 +322,8 @@ def _text(tracks: Sequence[Track], place: int, *, numbered: bool) -> str:
 def _told(what: str, tracks: Sequence[Track], taken: int, *, numbered: bool) -> str:
     names = _listed(tracks, numbered=numbered)
     number = f"{taken} = " if numbered else ""
-    return (
-        f"{len(tracks)} {what}: {names}: {number}{tracks[taken].name} is taken, --track chooses"
-        " another"
+    name = tracks[taken].name
+    return guessed(
+        f"{len(tracks)} {what}: {names}: {number}{name} is taken, --track chooses another",
+        *("track", name, f"give --track {taken if numbered else name}, or another"),
     )

@@ -27,6 +27,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from adv2e.errors import DataError
+from adv2e.label import guessed, told_of
 from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.frame import Light
 from adv2e.sources.images.opencv import read_image
@@ -112,10 +113,10 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     known = any(place.name == "GOPRO_Large_all" for place in path.absolute().parents)
     if sequence.kind == "all" and not known and not given:
         others = FrameRate(Fraction(_HZ, int(path.absolute().name[9:11]) or 1)).hz
-        times.doubts.append(
-            f"{path}: its names are of GOPRO_Large_all: {_HZ} frames a second; --fps {others} if"
-            " they are of GOPRO_Large"
-        )
+        told = f"its names are of GOPRO_Large_all: {_HZ} frames a second; --fps {others} if they"
+        how = f"give --fps {_HZ} or --fps {others}"
+        line = guessed(f"{told} are of GOPRO_Large", "fps", _HZ, how)
+        times.doubts.append(told_of(path, line))
     if sequence.blurred and not given:
         exposure_us = round(1e6 * sequence.window / _HZ)
         times.notes.append(

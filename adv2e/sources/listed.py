@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from adv2e.errors import DataError
+from adv2e.label import WHITE, guessed, told_of
 from adv2e.sources.base import GivenTimes, Selection, Source
 from adv2e.sources.bayer import in_colour, light_of
 from adv2e.sources.frame import Frame, Light, Shot, check_values
@@ -71,7 +72,7 @@ def timed(
     if (rate := given.rate) is not None:
         shots = [Shot(rate.time_ns(n), p.label, p.load) for n, p in enumerate(pictures)]
         doubt = numbering_doubt([picture.path or "" for picture in pictures], rate)
-        result = Timed(shots, [f"{path}: {line}" for line in (*order, doubt) if line], [])
+        result = Timed(shots, [told_of(path, line) for line in (*order, doubt) if line], [])
     elif given.timestamps is not None:
         label = str(given.timestamps)
         listed = read_list(given.timestamps, time_unit=given.time_unit)
@@ -124,7 +125,7 @@ def _listed(
         places = match(stamps, paths, label, f" in {path}")
     elif len(stamps) == len(pictures):
         places = list(range(len(pictures)))
-        doubts += [f"{path}: {line}" for line in order]
+        doubts += [told_of(path, line) for line in order]
     else:
         raise _other_number(label, len(stamps), len(pictures), path)
     shots = [
@@ -182,10 +183,9 @@ class ListedSource(Source):
         if self.dtype.kind == "u":
             self._look_for_white()
         elif self.largest > 1:
-            self.notes.append(
-                f"values above 1.0 (up to {self.largest:g} in the first frame); white is 1.0 unless"
-                " frames.full_scale says otherwise"
-            )
+            told = f"values above 1.0 (up to {self.largest:g} in the first frame); white is 1.0"
+            told += " unless frames.full_scale says otherwise"
+            self.notes.append(guessed(told, WHITE, 1.0))
 
     def _look_for_white(self) -> None:
         """Look at more frames than the first, should it be far below white."""

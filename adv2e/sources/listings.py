@@ -29,6 +29,7 @@ from pathlib import Path, PurePosixPath
 
 from adv2e.errors import DataError
 from adv2e.files.zips import Members
+from adv2e.label import guessed, told_of
 from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.frame import Frame, Light
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, decode_image
@@ -91,7 +92,10 @@ def open_listing(
     source = listed_source(files, listing, given, selection)
     if listing.other and files.has(f"{listing.other}/data.csv"):
         other = files.label(listing.other)
-        source.notes.append(f"{path}: its first camera is taken; the second is {other}")
+        told = f"its first camera is taken; the second is {other}"
+        first = files.label(listing.place.rpartition("/")[0])
+        how, why = f"give {first} or {other}", "there are two of them"
+        source.notes.append(told_of(path, guessed(told, "camera", "the first", how, why)))
     return source
 
 

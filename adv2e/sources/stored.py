@@ -51,7 +51,7 @@ def light_stored(description: Any, label: str) -> Light | None:
     white = stated.get("full_scale") if section == "frames" else None
     if white is not None and not _is_white(white):
         raise DataError(f"{label}: {section}.full_scale: must be a number above 0, got {white!r}")
-    return Light(encoding, _REASON, white)
+    return Light(encoding, _REASON, white, is_stated=True)
 
 
 def recorded_light(description: Any, label: str) -> Light:

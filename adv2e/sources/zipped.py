@@ -10,6 +10,7 @@ from pathlib import Path, PurePosixPath
 
 from adv2e.errors import DataError
 from adv2e.files.zips import Members
+from adv2e.label import left_out
 from adv2e.sources import davis240c
 from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.frame import Frame
@@ -59,8 +60,9 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
 
     missing = f"one of {', '.join(LISTS)} in it"
     times = timed(given, pictures, path, label, read, missing, told)
-    if left_out := len(pictures) - len(times.shots):
-        times.notes.append(f"{left_out} images are not in {label} and are left out")
+    if rest := len(pictures) - len(times.shots):
+        line = f"{rest} images are not in {label} and are left out"
+        times.notes.append(left_out(line, f"{rest} images that {found} does not name"))
     return ListedSource(path, "images", times, selection, has_clock=given.fps is None)
 
 

@@ -11,6 +11,7 @@ from adv2e.formats.writing import open_sink
 
 KEYS = [
     "file",
+    "label",
     "layout",
     "width",
     "height",

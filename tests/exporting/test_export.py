@@ -165,7 +165,7 @@ def test_it_says_how_it_was_made(adv2e):
     told = json.loads(Path("out/export.json").read_text())
     assert told["to"] == "voxel"
     assert told["sequences"] == [{"name": "a", "size": [WIDTH, HEIGHT], "items": 4}]
-    assert told["inputs"] == [{"name": "a", "file": "a.h5"}]
+    assert told["inputs"] == [{"name": "a", "file": "a.h5", "label": None}]
 
 
 def test_an_export_is_replaced_only_if_nothing_else_is_in_it(adv2e):

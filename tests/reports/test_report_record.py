@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from made_up_diagnosis import HOSTILE, everything, nothing, strange, unfinished
 
+from adv2e.label import guessed, told_of
 from adv2e.reports.files import record, record_text
 from adv2e.reports.markup import OF_RECORDINGS, OF_TABLES
 
@@ -100,6 +101,14 @@ def test_the_record_says_what_was_found():
     table = record(replace(everything(), wording=OF_TABLES))
     assert table.pop("table") == report.pop("recording")
     assert table == report
+
+
+def test_what_was_guessed_of_the_recording_is_its_label():
+    line = told_of("a.txt", guessed("no unit is stated", "time unit", "us", "give --time-unit us"))
+    label = record(replace(nothing(), notes=["other", line]))["label"]
+    guess = {"what": "time unit", "value": "us", "why": "no unit is stated"}
+    assert label == {"guessed": [guess], "left_out": []}
+    assert record(replace(nothing(), notes=["other"]))["label"] is None
 
 
 def test_an_empty_diagnosis_has_no_error():

@@ -15,6 +15,7 @@ from statistics import mean, median
 from typing import Any
 
 from adv2e.errors import DataError
+from adv2e.label import guessed, left_out, told_of
 from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, read_image
 from adv2e.sources.listed import ListedSource, Picture, timed
@@ -72,7 +73,8 @@ def in_order(names: Sequence[str]) -> tuple[list[str], list[str]]:
         told.append(f"names of {len(kinds)} kinds, such as {both}, are taken one after the other")
     if len(names) > 1 and all(map(_HASH.fullmatch, _rests(list(stems.values())))):
         told.append(f"names such as {_last(ordered[0])} hardly tell an order: give a list of times")
-    return ordered, told
+    how = "give --timestamps FILE that names them in order"
+    return ordered, [guessed(line, "order of frames", "by name", how) for line in told]
 
 
 def _last(name: str) -> str:
@@ -223,12 +225,12 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
     label = None if found is None else str(found)
     missing = f"one of {', '.join(LISTS)} there"
     times = timed(given, pictures, path, label, partial(_read, given), missing, told)
-    if left_out := len(pictures) - len(times.shots):
-        times.notes.append(f"{left_out} images are not in {found} and are left out")
+    if rest := len(pictures) - len(times.shots):
+        line = f"{rest} images are not in {found} and are left out"
+        times.notes.append(left_out(line, f"{rest} images that the list does not name"))
     if unread := _unread(path):
-        times.notes.append(
-            f"{path}: images that are not read are left out: {len(unread)}, such as {unread[0]}"
-        )
+        line = f"images that are not read are left out: {len(unread)}, such as {unread[0]}"
+        times.notes.append(told_of(path, left_out(line)))
     # the folder may be that of the frames of a recording of ours
     ours = found.with_name(DESCRIPTION) if found is not None and found.name == LIST else None
     light = None if ours is None else light_beside(ours)

@@ -17,6 +17,7 @@ import numpy as np
 
 from adv2e.errors import DataError
 from adv2e.geometry import MOST_PIXELS, Size
+from adv2e.label import guessed
 from adv2e.process.signals import Interrupt, wait_for
 from adv2e.sources.frame import Frame, Image, Light
 from adv2e.sources.times.rates import FrameRate, parse_rate
@@ -176,9 +177,10 @@ LONGEST_LINE = 1024
 _SHARED = {"mono": (0, 0), "420": (2, 2), "422": (2, 1), "444": (1, 1)}
 """Columns and rows of luma that share a sample of each chroma; none without chroma."""
 _PIXELS = re.compile(r"(mono|420|422|444)(?:(?<=420)(?:jpeg|mpeg2|paldv))?(?:p?(\d{1,2}))?", re.A)
-_NOTE = (
-    "Y4M does not say by which matrix its colours were made: BT.601 is taken; else send"
-    " -f rawvideo -pix_fmt rgb24"
+_HOW = "send -f rawvideo -pix_fmt rgb24"
+_NOTE = guessed(
+    f"Y4M does not say by which matrix its colours were made: BT.601 is taken; else {_HOW}",
+    *("matrix of colours", "BT.601", _HOW),
 )
 
 

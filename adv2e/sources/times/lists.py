@@ -20,6 +20,7 @@ from unicodedata import normalize
 
 from adv2e.errors import DataError
 from adv2e.files.regular import read_text_bytes
+from adv2e.label import told_of
 from adv2e.sources.times.rates import NUMBER, Stamp, Unit, frame_unit, parse_ns, seconds
 
 # ---- Pictures by the names in a list.
@@ -373,7 +374,7 @@ class FrameList:
         notes = [f"times from {label}: {self.columns}"]
         if self.order:
             notes.append(f"{label}: {self.order}")
-        return [f"{label}: {self.unit.doubt}"] if self.unit.doubt else [], notes
+        return [told_of(label, self.unit.doubt)] if self.unit.doubt else [], notes
 
 
 def first_name(text: str, label: str) -> str:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from adv2e.label import guessed
 from adv2e.ticks import LARGEST_NS
 
 # ---- Times of frames as decimal numbers.
@@ -229,14 +230,21 @@ def frame_unit(
     apart_s = max(step * UNITS[unit] / 1e9, 1e-12)
     if own_step_s and not 1 / 300 < apart_s / own_step_s < 300:
         told = f"times taken as {unit} are {apart_s:.6g} s apart, where the video's own are"
-        return Unit(unit, f"{told} {own_step_s:.6g} s apart; {SETTLED}")
+        told += f" {own_step_s:.6g} s apart; {SETTLED}"
+        return Unit(unit, told if stated else guessed_unit(told, unit))
     if sure:
         return Unit(unit)
     apart = f"{step:.6g} apart" + (", as frame numbers are," if min(steps) == 1 > step - 1 else "")
     rate = f"{1 / apart_s:.6g} frames a second"
     if stated is not None:
         return Unit(unit, f"times {apart} in {unit} are {rate}: is that right? {SETTLED}")
-    return Unit(unit, f"no unit is stated: times {apart} are taken as {unit} ({rate}); {SETTLED}")
+    told = f"no unit is stated: times {apart} are taken as {unit} ({rate}); {SETTLED}"
+    return Unit(unit, guessed_unit(told, unit))
+
+
+def guessed_unit(told: str, unit: str) -> str:
+    """Return a line that tells a unit of times that is a guess."""
+    return guessed(told, "time unit", unit, f"give --time-unit {unit}, or another")
 
 
 def _by_step(step: float, steps: Sequence[Any], ordered: Sequence[Any]) -> tuple[str, bool]:

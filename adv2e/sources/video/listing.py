@@ -20,6 +20,7 @@ from typing import Any
 import av
 import numpy as np
 
+from adv2e.label import guessed
 from adv2e.sources.times.rates import NS_PER_S, FrameRate, constant_rate, rates_near, seconds
 from adv2e.sources.video.opening import Video, overheard
 
@@ -160,13 +161,14 @@ def _arrange(found: Listing, stamps: list[int | None], video: Video) -> None:
         if hz:
             found.rate = FrameRate(Fraction(hz))
             told = f"it has no times: taken at {float(hz):.6g} frames a second, as it says itself"
-            found.doubts.append(told)
+            found.doubts.append(guessed(told, "fps", float(hz), f"give --fps {hz}, or another"))
     elif len(known) < found.count:
         found.rate, found.by_number = _rate_of_some(found, stream.guessed_rate), True
         rest = (
             f"taken at {float(found.rate.hz):.6g} frames a second" if found.rate else "they follow"
         )
-        found.doubts.append(f"it states times for {len(known)} of its {found.count} frames: {rest}")
+        told = f"it states times for {len(known)} of its {found.count} frames: {rest}"
+        found.doubts.append(guessed(told, "times of frames", rest, "give --fps or --timestamps"))
     elif video.format in _MILLISECONDS:
         hz = float(stream.guessed_rate or 0)
         found.rate = constant_rate(found.shown_ns, stated_hz=hz, tolerance_ns=found.tick_ns)

@@ -15,6 +15,7 @@ from typing import Any
 import av
 
 from adv2e.errors import DataError
+from adv2e.label import left_out, told_of
 from adv2e.sources.base import GivenTimes, Selection, Source
 from adv2e.sources.frame import Light, Shot
 from adv2e.sources.times.lists import read_list
@@ -69,18 +70,18 @@ class VideoSource(Source):
         if first is None:
             raise DataError(f"{self.path}: no frame in it can be decoded: not a video, or damaged")
         odd = oddly_shown(first)
-        self.doubts += [f"{self.path}: {each}" for each in (*listing.faults, odd) if each]
-        self.notes += [f"{self.path}: {each}" for each in video.told]
+        faults = filter(None, (*listing.faults, odd))
+        self.doubts += [told_of(self.path, left_out(each)) for each in faults]
+        self.notes += [told_of(self.path, each) for each in video.told]
         aspect = video.stream.sample_aspect_ratio
         if aspect and aspect != 1:
-            self.notes.append(
-                f"{self.path}: its pixels are not square ({aspect.numerator}:{aspect.denominator}):"
-                " they are taken as they are stored"
-            )
+            told = f"its pixels are not square ({aspect.numerator}:{aspect.denominator})"
+            told += ": they are taken as they are stored"
+            self.notes.append(told_of(self.path, left_out(told)))
         transfer = int(first.color_trc)
         if not is_stated(transfer):
             transfer = int(video.stream.codec_context.color_trc)
-        light = Light(*encoding_of(transfer))
+        light = Light(*encoding_of(transfer), is_stated=is_stated(transfer))
         if first.format.name.startswith("gray16") and not is_stated(transfer):
             light = Light("linear", "16-bit grey video")
         self._meaning = encoding_of(transfer)
@@ -132,7 +133,7 @@ class VideoSource(Source):
             )
         if not listing.shown_ns and listing.rate is None:
             raise DataError(f"{self.path}: it states no times; give --fps or --timestamps")
-        self.doubts += [f"{self.path}: {doubt}" for doubt in listing.doubts]
+        self.doubts += [told_of(self.path, doubt) for doubt in listing.doubts]
         if listing.back is None and listing.rate is None:
             self.doubts += gap_doubts(listing.shown_ns, self.path)
 
@@ -183,23 +184,22 @@ class VideoSource(Source):
                     continue  # only counted
                 t_ns = given(number) if given is not None else clock.time_ns(number, own_ns)
                 if frame.interlaced_frame:
-                    self._note(_FIELDS)
+                    self._note(left_out(_FIELDS))
                 self._check_transfer(frame, label)
                 if self.selection.allow_damaged and latest_ns is not None and t_ns <= latest_ns:
-                    self._note(f"{label}: its time is that of frames before: left out")
+                    told = f"frame {number}: its time is that of frames before: left out"
+                    self._note(told_of(self.path, left_out(told)))
                     continue
                 latest_ns = t_ns
                 yield Shot(t_ns, label, partial(converter.frame, frame, label))
         if guessed:
-            self._note(f"{self.path}: the decoder met errors in {guessed} of {count} frames")
+            told = f"the decoder met errors in {guessed} of {count} frames"
+            self._note(told_of(self.path, left_out(told)))
         if self._listed is not None and self._listed != count:
             raise DataError(f"{self.path}: {self._listed} times given for {count} frames")
         if lost := self._lost(count, round((first - self._listing.origin) * tick)):
-            self._check_damage(
-                f"{self.path}: {count} frames could be decoded where it states {count + lost}: cut"
-                " short or damaged",
-                those=True,
-            )
+            told = f"{count} frames could be decoded where it states {count + lost}: cut short or"
+            self._check_damage(told_of(self.path, left_out(f"{told} damaged")), those=True)
 
     def _decoded(self, video: Video) -> Iterator[Any]:
         """Yield the pictures that can be decoded, in the order they are shown."""
