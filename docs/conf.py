@@ -29,9 +29,7 @@ napoleon_google_docstring = False
 napoleon_use_param = False  # types there are sentences, not names to be linked
 napoleon_use_rtype = False
 napoleon_use_ivar = True
-nitpick_ignore_regex = [
-    ("py:class", "[a-z0-9]+|Path|Section")
-]  # words in types of attributes
+nitpick_ignore_regex = [("py:class", "[a-z0-9]+|Path|Section")]  # words in types of attributes
 
 
 def _inline(self, node):
