@@ -24,15 +24,15 @@ LIMITS = {
     "comparison": 1165,
     "compilation": 285,
     "config": 1315,
-    "conversion": 1195,
+    "conversion": 1480,
     "diagnosis": 8320,
-    "effects": 1615,
+    "effects": 1650,
     "exporting": 1075,
     "files": 785,
     "formats": 5110,
     "inspection": 260,
     "kernel": 5940,
-    "light": 890,
+    "light": 900,
     "motion": 370,
     "pixel": 575,
     "process": 265,
@@ -45,7 +45,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 340
+FILES = 341
 """Most modules of all packages together."""
 
 _SLACK = 60
