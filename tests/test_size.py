@@ -18,19 +18,19 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1670,
+    "": 1680,
     "batches": 1515,
     "cli": 1235,
     "comparison": 1165,
     "compilation": 285,
     "config": 1315,
-    "conversion": 1480,
+    "conversion": 1485,
     "diagnosis": 8320,
     "effects": 1650,
     "exporting": 1075,
     "files": 785,
     "formats": 5110,
-    "inspection": 260,
+    "inspection": 265,
     "kernel": 5940,
     "light": 900,
     "motion": 370,
@@ -40,12 +40,12 @@ LIMITS = {
     "reports": 1791,
     "representations": 145,
     "side": 845,
-    "sources": 3680,
+    "sources": 3825,
     "synthetic": 160,
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 341
+FILES = 342
 """Most modules of all packages together."""
 
 _SLACK = 60

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
@@ -22,7 +21,7 @@ from adv2e.config.tree import flat
 from adv2e.conversion import simulation
 from adv2e.effects.composition import begin, light_now, map_events
 from adv2e.effects.frames.brightness import bounded
-from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
+from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Hooks
 from adv2e.errors import ConfigError, DataError, UsageError
 from adv2e.events import EVENT_DTYPE, Events
@@ -102,7 +101,7 @@ class Camera:
             raise UsageError(f"count: must be a whole number from 1 on, got {count!r}")
         self.config = load_config(config, seed=seed, size=size)
         self.count = count
-        self._given = effects, threads, causes
+        self._given: dict[str, Any] = {"effects": effects, "threads": threads, "causes": causes}
         self._threads = threads or default_threads()
         self._pool: tuple[int, ThreadPoolExecutor] | None = None
         # several work side by side, each in one thread
@@ -214,17 +213,8 @@ class Camera:
             One of the type of those to come; default: of 8 bits, grey and in colour.
         """
         usual = [np.zeros((1, 1), np.uint8), np.zeros((1, 1, 3), np.uint8)]
-        effects, threads, causes = self._given
-        config = replace(self.config, sensor=None)
-        for image in usual if frame is None else [_array(frame, "frame")]:
-            white = config.frames.full_scale or full_scale_of(image.dtype)
-            camera = Camera(None, config, effects=effects, threads=threads, causes=causes)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                for number, share in enumerate((0.1, 0.9, 0.1, 0.9, 0.9)):
-                    shape = (32, 32, *image.shape[2:])
-                    camera.push(np.full(shape, share * white).astype(image.dtype), number * 0.01)
-                camera.close()
+        for kind in usual if frame is None else [_array(frame, "frame")]:
+            simulation.warm(self.config, kind, **deepcopy(self._given))
 
     def _each(self, call: Any, *arguments: Sequence[Any]) -> list[Events]:
         """Return what a method of each of several cameras returns, which work side by side."""
@@ -240,11 +230,10 @@ class Camera:
         return self._pool[1]
 
     def _identity(self) -> dict[str, Any]:
-        effects, _, causes = self._given
-        sources, own = user_sources(self.config), [one.name for one in effects]
-        values = flat(to_dict(replace(self.config, seed=0)))
-        kept = {"adv2e": __version__, "count": self.count, "causes": causes, "effects": own}
-        return {**kept, "sources": [dict(one) for one in sources], **dict(values)}
+        sources, own = user_sources(self.config), [one.name for one in self._given["effects"]]
+        kept = {"adv2e": __version__, "count": self.count, "causes": self._given["causes"]}
+        named = {"effects": own, "sources": [dict(one) for one in sources]}
+        return {**kept, **named, **dict(flat(to_dict(replace(self.config, seed=0))))}
 
 
 class _Sensor:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 import math
 import threading
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +20,7 @@ from adv2e.config import Config, Written, load_config
 from adv2e.config.active_effects import active_hooks
 from adv2e.effects.composition import begin, check_causes, map_events, overrides
 from adv2e.effects.frames.brightness import bounded, check_floats
-from adv2e.effects.frames.encoding import LightDecoder
+from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.effects.hooks import Frames, Hooks, LightFrame
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.errors import ConfigError, DataError, UsageError, warn
@@ -420,6 +422,21 @@ def _pixel_events(
     apart = threads > 1 or threading.current_thread() is threading.main_thread()
     with worker_pool(threads) if apart else nullcontext() as pool:
         yield from pixels.events(frames, pool, complete)
+
+
+def warm(config: Config, kind: NDArray[Any], **options: Any) -> None:
+    """Compile, or load, all that frames of the type and channels of one need.
+
+    `options`: those of :func:`simulate`.
+    """
+    config = replace(config, sensor=None)
+    white = config.frames.full_scale or full_scale_of(kind.dtype)
+    flashes = np.array([0.1, 0.9, 0.1, 0.9, 0.9]).reshape(-1, *[1] * kind.ndim) * white
+    frames = np.broadcast_to(flashes, (5, 32, 32, *kind.shape[2:])).astype(kind.dtype)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for _ in simulate(frames, 100.0, config, **options):
+            pass
 
 
 def check_all_causes(hooks: Sequence[Hooks], config: Config) -> None:
