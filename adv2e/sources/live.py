@@ -166,7 +166,8 @@ class LiveSource(Source):
             return time.monotonic_ns()
         if frame.pts is None:
             raise DataError(f"{label}: states no time, as those before did; give --fps")
-        return int(round(frame.pts * frame.time_base * NS_PER_S))
+        t_ns: int = round(frame.pts * frame.time_base * NS_PER_S)
+        return t_ns
 
 
 def _why(error: Exception) -> str:
