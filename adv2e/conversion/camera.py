@@ -86,16 +86,11 @@ class Camera:
     """
 
     def __init__(
-        self,
-        size: tuple[int, int] | None = None,
-        config: Written | Sequence[Written] | None = None,
-        seed: int | None = None,
-        *,
-        count: int | None = None,
-        effects: Sequence[Hooks] = (),
-        threads: int | None = None,
+        self, size: tuple[int, int] | None = None,
+        config: Written | Sequence[Written] | None = None, seed: int | None = None, *,
+        count: int | None = None, effects: Sequence[Hooks] = (), threads: int | None = None,
         causes: bool = False,
-    ) -> None:
+    ) -> None:  # fmt: skip
         simulation.check_threads(threads)
         if count is not None and not (isinstance(count, (int, np.integer)) and count >= 1):
             raise UsageError(f"count: must be a whole number from 1 on, got {count!r}")

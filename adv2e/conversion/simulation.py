@@ -300,18 +300,16 @@ def events_from_light(
     if any(overrides(hook, "events") for hook in hooks):
         complete = None
     frames = bounded(begin(hooks, iter(light), config.seed), table)
-    made = _pixel_events(
-        frames,
-        config,
-        hooks,
-        table,
-        complete,
-        given,
-        threads=threads,
-        coarseness=coarseness,
+    pixels = Pixels(
+        *next(frames), config, hooks, table, given, threads=threads, coarseness=coarseness,
         causes=causes,
-    )
-    yield from limited(map_events(hooks, made, causes), config.max_events)
+    )  # fmt: skip
+    threads = pixels.array.threads
+    # the main thread cannot be interrupted in compiled code
+    apart = threads > 1 or threading.current_thread() is threading.main_thread()
+    with worker_pool(threads) if apart else nullcontext() as pool:
+        made = pixels.events(frames, pool, complete)
+        yield from limited(map_events(hooks, made, causes), config.max_events)
 
 
 def limited(made: Iterator[Events], most: int) -> Iterator[Events]:
@@ -344,15 +342,9 @@ class Pixels:
     """
 
     def __init__(
-        self,
-        t_ns: int,
-        first: NDArray[Any],
-        config: Config,
-        hooks: Sequence[Hooks],
-        table: NDArray[np.float32] | None,
-        given: GivenFlow | None = None,
-        **options: Any,
-    ) -> None:
+        self, t_ns: int, first: NDArray[Any], config: Config, hooks: Sequence[Hooks],
+        table: NDArray[np.float32] | None, given: GivenFlow | None = None, **options: Any,
+    ) -> None:  # fmt: skip
         light = first if table is None else table.take(first)
         self.array = PixelArray(
             config.pixel, config.sampling, config.seed, light, t_ns, hooks=hooks, **options
@@ -363,13 +355,9 @@ class Pixels:
         self._hooks, self._table = hooks, table
 
     def events(
-        self,
-        frames: Frames,
-        pool: ThreadPoolExecutor | None,
-        complete: Callable[[int], None] | None = None,
-        *,
-        ends: bool = True,
-    ) -> Iterator[Events]:
+        self, frames: Frames, pool: ThreadPoolExecutor | None,
+        complete: Callable[[int], None] | None = None, *, ends: bool = True,
+    ) -> Iterator[Events]:  # fmt: skip
         """Yield the sorted events up to the last of the frames that follow.
 
         Unless they end there, those of its microsecond wait for others; see :meth:`Intervals.parts`
@@ -404,24 +392,6 @@ class Pixels:
             row[:] = state["rows"].get(k, 0.0)
         self.array.started, self.order.held = state["started"], state["held"]
         self.intervals.load(state["intervals"])
-
-
-def _pixel_events(
-    frames: Frames,
-    config: Config,
-    hooks: Sequence[Hooks],
-    table: NDArray[np.float32] | None,
-    complete: Callable[[int], None] | None,
-    given: GivenFlow | None,
-    **options: Any,
-) -> Iterator[Events]:
-    """Yield the sorted events of the pixels for all frames; `options`: those of :class:`Pixels`."""
-    pixels = Pixels(*next(frames), config, hooks, table, given, **options)
-    threads = pixels.array.threads
-    # the main thread cannot be interrupted in compiled code
-    apart = threads > 1 or threading.current_thread() is threading.main_thread()
-    with worker_pool(threads) if apart else nullcontext() as pool:
-        yield from pixels.events(frames, pool, complete)
 
 
 def warm(config: Config, kind: NDArray[Any], **options: Any) -> None:

@@ -127,6 +127,13 @@ def is_live(path: str | Path) -> bool:
     return re.fullmatch(r"\d{1,3}", text, re.ASCII) is not None and not Path(text).exists()
 
 
+def check_stored(path: str | Path) -> None:
+    """Refuse (DataError) a camera or an address where frames of a recording are wanted."""
+    if is_live(path):
+        told = without_password(path)
+        raise DataError(f"{told}: a camera or an address, which adv2e convert and info read alone")
+
+
 def _advice(path: str) -> str:
     """Return advice on a missing path that looks like a pattern, else ''."""
     if any(character in path for character in "*?%"):

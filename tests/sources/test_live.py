@@ -233,3 +233,15 @@ def test_a_password_is_not_told():
         with pytest.raises(DataError, match=r"^rtsp://127\.0\.0\.1:9/stream: ") as caught:
             open_source(address, **options)
         assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["0", "/dev/video0", "http://127.0.0.1:9/clip.mp4"])
+def test_commands_that_need_a_recording_take_no_camera(adv2e, tmp_path, camera, name):
+    events = tmp_path / "a.txt"
+    events.write_text("0.000001000 1 1 1\n0.000002000 1 1 0\n")
+    compared = adv2e("compare", events, events, "--frames", name)
+    line = f"{name}: a camera or an address, which adv2e convert and info read alone"
+    assert (compared.status, line in compared.err) == (1, True), compared.err
+    batch = adv2e("batch", name, tmp_path / "out")
+    assert batch.status != 0
+    assert len(batch.err.splitlines()) == 1
