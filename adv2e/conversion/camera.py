@@ -25,6 +25,8 @@ from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Hooks
 from adv2e.errors import ConfigError, DataError, UsageError
 from adv2e.events import EVENT_DTYPE, Events
+from adv2e.geometry import parse_size
+from adv2e.in_python import reworded
 from adv2e.light.decoding import kernel_table
 from adv2e.light.sensor import Fitting, fitting_of
 
@@ -85,6 +87,7 @@ class Camera:
     True
     """
 
+    @reworded
     def __init__(
         self, size: tuple[int, int] | None = None,
         config: Written | Sequence[Written] | None = None, seed: int | None = None, *,
@@ -94,6 +97,10 @@ class Camera:
         simulation.check_threads(threads)
         if count is not None and not (isinstance(count, (int, np.integer)) and count >= 1):
             raise UsageError(f"count: must be a whole number from 1 on, got {count!r}")
+        try:
+            size = size and parse_size(size)
+        except ValueError as error:
+            raise UsageError(f"size: {error}") from None
         self.config = load_config(config, seed=seed, size=size)
         self.count = count
         self._given: dict[str, Any] = {"effects": effects, "threads": threads, "causes": causes}
@@ -142,9 +149,10 @@ class Camera:
             image, t_ns = self._all[0].checked(frame, t)
             return self._all[0].push(image, t_ns, self._workers())
         frames: Any = frame if isinstance(frame, (list, tuple)) else _array(frame, "frames")
-        times = np.asarray(t, np.float64)
-        if np.ndim(frames) == 0 or len(frames) != self.count:
-            raise DataError(f"{np.shape(frames)[:1] or 'no'} frames for {self.count} cameras")
+        times = np.asarray(t)
+        number = len(frames) if isinstance(frames, (list, tuple)) or frames.ndim else 0
+        if number != self.count:
+            raise DataError(f"{number} frames for {self.count} cameras")
         if times.shape not in ((), (self.count,)):
             raise DataError(f"times of shape {times.shape} for {self.count} cameras")
         given = zip(self._all, frames, np.broadcast_to(times, self.count), strict=True)
@@ -157,6 +165,7 @@ class Camera:
             return self._all[0].close(self._workers())
         return self._each(_Sensor.close)
 
+    @reworded
     def reset(self, seed: int | None = None, where: ArrayLike | None = None) -> None:
         """Begin anew: the same frames then make the same events as with a new camera.
 

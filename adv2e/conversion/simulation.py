@@ -207,9 +207,12 @@ def tell_far_apart(apart_s: float) -> None:
 
 def checked_time(time: Any, label: str) -> int:
     """Return a time in ns; DataError if it is none."""
-    t_s = float(time)
+    try:
+        t_s = float(time)
+    except (TypeError, ValueError):
+        t_s = math.nan
     if not math.isfinite(t_s):
-        raise DataError(f"{label}: its time is {t_s}, must be a number of seconds")
+        raise DataError(f"{label}: its time is {time}, must be a number of seconds")
     check_time(t_s * 1e9, label)
     return round(t_s * 1e9)
 

@@ -233,6 +233,7 @@ def test_what_needs_later_frames_is_refused(key, text):
     [
         (np.zeros((ROWS, COLUMNS), np.uint8), TIMES[2], r"frame 3: its time 3.006800000 s is not"),
         (np.zeros((ROWS, COLUMNS), np.uint8), np.nan, "frame 3: its time is nan"),
+        (np.zeros((ROWS, COLUMNS), np.uint8), "now", "frame 3: its time is now, must be a number"),
         (np.zeros((ROWS, COLUMNS + 1), np.uint8), 9.0, r"frame 3: uint8 \(24, 33\), but the first"),
         (np.zeros((ROWS, COLUMNS), np.float32), 9.0, "frame 3: float32"),
         (object(), 9.0, "frame 3: object"),
@@ -316,6 +317,12 @@ def test_wrong_arguments_are_one_line():
         Camera(count=0)
     with pytest.raises(UsageError, match="threads"):
         Camera(threads=0)
+    with pytest.raises(
+        UsageError, match="size: must be columns x rows, such as 346x260, got '0x3'"
+    ):
+        Camera((0, 3))
+    with pytest.raises(UsageError, match="^seed: must be at least 0"):
+        Camera(seed=-1)
     camera = Camera(SIZE, count=2)
     with pytest.raises(DataError, match="frames for 2 cameras"):
         camera.push(clip()[0], 0.0)
