@@ -24,7 +24,7 @@ LIMITS = {
     "comparison": 1165,
     "compilation": 285,
     "config": 1315,
-    "conversion": 1450,
+    "conversion": 1465,
     "diagnosis": 8320,
     "effects": 1650,
     "exporting": 1075,

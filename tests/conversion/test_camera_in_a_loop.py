@@ -321,7 +321,7 @@ def test_wrong_arguments_are_one_line():
         UsageError, match="size: must be columns x rows, such as 346x260, got '0x3'"
     ):
         Camera((0, 3))
-    with pytest.raises(UsageError, match="^seed: must be at least 0"):
+    with pytest.raises(UsageError, match=r"^seed: must be at least 0"):
         Camera(seed=-1)
     camera = Camera(SIZE, count=2)
     with pytest.raises(DataError, match="frames for 2 cameras"):
