@@ -2,6 +2,7 @@
 
 ============  ====================================================================================
 simulate      frames in memory -> events, chunk by chunk
+Camera        one frame after the other, of a simulator or live -> the events between them
 convert       video, folder of images or recording -> a file of events
 load_config   a configuration from files, names, mappings and single keys; its type is Config
 read_events   a file of events -> Recording (events, sensor size, frames if there are any)
@@ -44,6 +45,7 @@ __all__ = [
     "EVENT_DTYPE",
     "Adv2eError",
     "Adv2eWarning",
+    "Camera",
     "Config",
     "ConfigError",
     "DataError",
@@ -72,6 +74,7 @@ if TYPE_CHECKING:
     from adv2e.batches.run import batch
     from adv2e.comparison.compare import compare
     from adv2e.config import Config, load_config
+    from adv2e.conversion.camera import Camera
     from adv2e.conversion.convert import convert
     from adv2e.conversion.simulation import simulate
     from adv2e.diagnosis.recordings import diagnose
@@ -98,6 +101,7 @@ _HOMES = {
     "EVENT_DTYPE": "adv2e.events",
     "Adv2eError": "adv2e.errors",
     "Adv2eWarning": "adv2e.errors",
+    "Camera": "adv2e.conversion.camera",
     "Config": "adv2e.config",
     "ConfigError": "adv2e.errors",
     "DataError": "adv2e.errors",

@@ -311,6 +311,13 @@ class FrameInput(AnyFrames, total=False):
             choices=PIXEL_FORMATS,
         ),
     ]
+    network: Annotated[
+        bool,
+        Option(
+            help="INPUT may be an address, such as rtsp://CAMERA/stream, that FFmpeg opens.",
+            default=False,
+        ),
+    ]
 
 
 class Clock(TypedDict, total=False):

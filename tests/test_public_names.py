@@ -15,7 +15,7 @@ import adv2e
 from adv2e.errors import Adv2eError
 
 ERRORS = {name for name in adv2e.__all__ if name.endswith(("Error", "Warning"))}
-TYPES = {"Config", "Recording"}
+TYPES = {"Camera", "Config", "Recording"}
 NAMES = sorted(set(adv2e.__all__) - ERRORS - {"__version__", "EVENT_DTYPE"})  # with an example each
 
 

@@ -18,21 +18,21 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1825,
+    "": 1835,
     "batches": 1520,
     "cli": 1256,
     "comparison": 1165,
     "compilation": 285,
     "config": 1315,
-    "conversion": 1250,
+    "conversion": 1515,
     "diagnosis": 8320,
-    "effects": 1615,
+    "effects": 1650,
     "exporting": 1075,
     "files": 785,
     "formats": 5155,
-    "inspection": 270,
-    "kernel": 5940,
-    "light": 895,
+    "inspection": 275,
+    "kernel": 5960,
+    "light": 905,
     "motion": 370,
     "pixel": 575,
     "process": 265,
@@ -40,12 +40,12 @@ LIMITS = {
     "reports": 1775,
     "representations": 145,
     "side": 870,
-    "sources": 3720,
+    "sources": 3870,
     "synthetic": 160,
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 344
+FILES = 346
 """Most modules of all packages together."""
 
 _SLACK = 60

@@ -9,7 +9,7 @@ from adv2e.errors import UsageError
 _GROUPS = {
     "Input": (
         *("fps", "timestamps", "time_unit", "track", "start", "stop", "start_s", "stop_s", "crop"),
-        *("rotate180", "bayer", "pixel_format", "allow_damaged", "take"),
+        *("rotate180", "bayer", "pixel_format", "network", "allow_damaged", "take"),
         *("set_back", "crop_events", "side"),
         "light",
     ),

@@ -54,13 +54,16 @@ def command(
       adv2e convert photo.png --motion saccade -o photo.h5
       adv2e convert clip.events.h5 -o clip.txt
       ffmpeg -i clip.mp4 -f yuv4mpegpipe - | adv2e convert - -o piped.h5
+      adv2e convert 0 --stop 10 -o live.h5
 
     INPUT is a video file, a folder or a zip of images, a recording of a data set (DAVIS240C, GOPRO,
     TUM RGB-D, EuRoC, UZH-FPV), a TIFF of several pages, or a .npy stack of frames, grey (frames,
     rows, columns) or colour (with a fourth axis, of 3). INPUT - is standard input, through which
-    Y4M or raw video comes. It may be a file of events, too: these are written in the format of OUT,
-    and nothing is simulated. Frames from a pipe end with the first Ctrl-C: the events of those that
-    came whole are written. A second Ctrl-C stops at once and leaves nothing.
+    Y4M or raw video comes. A camera at this computer is a number, or
+    /dev/video0. An address is read with --network. INPUT may be a file of events, too: these are
+    written in the format of OUT, and nothing is simulated. Frames from a pipe or a camera end with
+    the first Ctrl-C: the events of those that came whole are written. A second Ctrl-C stops at once
+    and leaves nothing.
 
     Without -o, the events go to <stem>.events.h5 in the current folder, or with the suffix of
     --format. The suffix of OUT chooses the format:

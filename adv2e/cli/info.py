@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
@@ -14,12 +13,12 @@ from adv2e.process.bars import reading_bar
 
 
 @click.command("info", cls=Command)
-@click.argument("file", metavar="FILE", type=click.Path(path_type=Path, readable=False))
+@click.argument("file", metavar="FILE", type=click.Path(readable=False))
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, always with the same keys.")
 @options.declared_options(InfoOptions)
 @options.reporting_options
 def command(
-    file: Path, as_json: bool, given: dict[str, Any], progress: bool, log: options.Log
+    file: str, as_json: bool, given: dict[str, Any], progress: bool, log: options.Log
 ) -> None:
     """Show what a video, a recording or an event file holds.
 

@@ -35,7 +35,7 @@ from adv2e.in_python import in_python
 from adv2e.label import report_of
 from adv2e.light.sensor import check_beside
 from adv2e.options import CompareOptions, EventInput, chosen, declared, takes
-from adv2e.sources import PICTURES, VIDEO_SUFFIXES
+from adv2e.sources import PICTURES, VIDEO_SUFFIXES, check_stored
 from adv2e.sources.times.rates import seconds
 
 if TYPE_CHECKING:
@@ -304,6 +304,8 @@ def _opened(
     }
     for name in (name for name, value in given.items() if value and name not in of_files):
         raise UsageError(f"{name}: is of the reading of a file: leave it out")
+    if frames is not None:
+        check_stored(frames)
     return (
         _read(measured, given, reading),
         _read(simulated, {**given, **whole}, reading),

@@ -29,7 +29,7 @@ from adv2e.causes import CAUSES
 from adv2e.config import Config, to_dict
 from adv2e.config.active_effects import active_hooks, user_sources
 from adv2e.conversion.reading import Decoded, Decoding, Reading
-from adv2e.conversion.simulation import events_from_light
+from adv2e.conversion.simulation import events_from_light, warm
 from adv2e.effects.frames.brightness import check_white
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Frames
@@ -53,7 +53,7 @@ from adv2e.side.carrying import SideData, find_side
 from adv2e.side.maps import Maps
 from adv2e.side.placement import Clock, Placement
 from adv2e.sources import STDIN
-from adv2e.sources.base import Source
+from adv2e.sources.base import LIVE, Source
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -303,6 +303,9 @@ def convert_reading(
         )
         if progress:
             decoded = _shown(decoded, recording.count, out, stack)
+        if recording.kind in LIVE:  # frames that came meanwhile would be lost
+            kind = np.zeros((1, 1, 3) if recording.colour else (1, 1), recording.dtype)
+            warm(config, kind, threads=workers, causes=causes)
         chunks = events_from_light(
             out.light_of(decoded),
             config,

@@ -5,8 +5,11 @@ from __future__ import annotations
 import itertools
 import math
 import threading
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +20,7 @@ from adv2e.config import Config, Written, load_config
 from adv2e.config.active_effects import active_hooks
 from adv2e.effects.composition import begin, check_causes, map_events, overrides
 from adv2e.effects.frames.brightness import bounded, check_floats
-from adv2e.effects.frames.encoding import LightDecoder
+from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.effects.hooks import Frames, Hooks, LightFrame
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.errors import ConfigError, DataError, UsageError, warn
@@ -120,12 +123,12 @@ def simulate(
     """
     if not isinstance(config, Config) or seed is not None or size is not None:
         config = load_config(config, seed=seed, size=size)
-    _check_threads(threads)
+    check_threads(threads)
     instants, has_rate = _instants(times, fps)
     _check_numbers(frames, times)
     hooks = active_hooks(config, effects)
     if causes:
-        _check_causes(hooks, config)
+        check_all_causes(hooks, config)
     coming = iter(frames)
     first = next(coming, None)
     if first is None:
@@ -133,7 +136,7 @@ def simulate(
     if strict:
         meant = light_of_images(Frame(np.asarray(first)), "arrays")
         Label().refuse("frames", light_line(meant, 0, config.frames))
-    decoder = _decoder_for(np.asarray(first), config)
+    decoder = decoder_of(np.asarray(first), config)
     rows, columns = np.shape(first)[:2]
     fitting = fitting_of(columns, rows, config.sensor, "frame 0")
     table = kernel_table(decoder, config.sampling, hooks, fitting)
@@ -162,7 +165,8 @@ def _check_numbers(frames: object, times: object) -> None:
         raise DataError(f"{len(times)} times for {len(frames)} frames")
 
 
-def _check_threads(threads: Any) -> None:
+def check_threads(threads: Any) -> None:
+    """Raise UsageError unless it is a number of threads, or None."""
     if threads is not None and not (isinstance(threads, (int, np.integer)) and threads >= 1):
         raise UsageError(f"threads: must be a whole number from 1 on, got {threads!r}")
 
@@ -199,12 +203,37 @@ def _instants(times: Any, fps: Rate | None) -> tuple[Iterable[float], bool]:
     return (rate.time_ns(number) / NS_PER_S for number in itertools.count()), True
 
 
-def _tell_far_apart(apart_s: float) -> None:
+def tell_far_apart(apart_s: float) -> None:
+    """Warn where the first two frames lie so far apart that seconds are hardly meant."""
     if apart_s >= _FAR_APART_S:
         warn(
             f"the second frame comes {apart_s:g} s after the first: times are in seconds; divide"
             " milliseconds by 1e3, microseconds by 1e6"
         )
+
+
+def checked_time(time: Any, label: str) -> int:
+    """Return a time in ns; DataError if it is none."""
+    try:
+        t_s = float(time)
+    except (TypeError, ValueError):
+        t_s = math.nan
+    if not math.isfinite(t_s):
+        raise DataError(f"{label}: its time is {time}, must be a number of seconds")
+    check_time(t_s * 1e9, label)
+    return round(t_s * 1e9)
+
+
+def check_frame(
+    image: NDArray[Any], first: tuple[Any, Any], label: str, full_scale: float | None
+) -> None:
+    """Refuse a frame of another data type and shape than the `first`, or of wrong numbers."""
+    if (image.dtype, image.shape) != first:
+        raise DataError(
+            f"{label}: {image.dtype} {image.shape}, but the first frame is {first[0]} {first[1]}"
+        )
+    check_values(image, label)
+    check_floats(image, label, full_scale)
 
 
 def _checked(
@@ -217,33 +246,25 @@ def _checked(
     """Yield time [ns] and numbers of each frame; with a rate, there are always more times."""
     coming = iter(times)
     first: NDArray[Any] | None = None
-    began_s = 0.0
+    began_ns = 0
     for number, frame in enumerate(frames):
         label, image, time = f"frame {number}", np.asarray(frame), next(coming, None)
         if time is None:
             raise DataError(f"{label}: has no time (there are fewer times)")
-        t_s = float(time)
-        if not math.isfinite(t_s):
-            raise DataError(f"{label}: its time is {t_s}, must be a number of seconds")
-        check_time(t_s * 1e9, label)
-        if number == 0:
-            began_s = t_s
-        elif number == 1:
-            _tell_far_apart(t_s - began_s)
         first = image if first is None else first
-        if image.shape != first.shape or image.dtype != first.dtype:
-            raise DataError(
-                f"{label}: {image.dtype} {image.shape}, but the first frame is"
-                f" {first.dtype} {first.shape}"
-            )
-        check_values(image, label)
-        check_floats(image, label, full_scale)
-        yield round(t_s * 1e9), image
+        t_ns = checked_time(time, label)
+        if number == 0:
+            began_ns = t_ns
+        elif number == 1:
+            tell_far_apart((t_ns - began_ns) * 1e-9)
+        check_frame(image, (first.dtype, first.shape), label, full_scale)
+        yield t_ns, image
     if not has_rate and next(coming, None) is not None:
         raise DataError(f"more times than frames, of which there are {number + 1}")
 
 
-def _decoder_for(image: NDArray[Any], config: Config) -> LightDecoder:
+def decoder_of(image: NDArray[Any], config: Config) -> LightDecoder:
+    """Return the decoder of frames like one in memory; warns where it is a guess."""
     colour = image.ndim == 3
     if image.ndim not in (2, 3) or (colour and image.shape[2] != 3):
         raise DataError(
@@ -287,24 +308,22 @@ def events_from_light(
     """
     hooks = active_hooks(config) if hooks is None else hooks
     if causes:
-        _check_causes(hooks, config)
+        check_all_causes(hooks, config)
     if any(overrides(hook, "events") for hook in hooks):
         complete = None
     frames = bounded(begin(hooks, iter(light), config.seed), table)
-    made = _pixel_events(
-        frames,
-        config,
-        hooks,
-        table,
-        complete,
-        given,
-        threads=threads,
-        coarseness=coarseness,
+    pixels = Pixels(
+        *next(frames), config, hooks, table, given, threads=threads, coarseness=coarseness,
         causes=causes,
-    )
-    if fired is not None:
-        made = _counted(made, fired)
-    yield from _limited(map_events(hooks, made, causes), config.max_events)
+    )  # fmt: skip
+    threads = pixels.array.threads
+    # the main thread cannot be interrupted in compiled code
+    apart = threads > 1 or threading.current_thread() is threading.main_thread()
+    with worker_pool(threads) if apart else nullcontext() as pool:
+        made = pixels.events(frames, pool, complete)
+        if fired is not None:
+            made = _counted(made, fired)
+        yield from limited(map_events(hooks, made, causes), config.max_events)
 
 
 def _counted(made: Iterator[Events], fired: Callable[[int], None]) -> Iterator[Events]:
@@ -315,7 +334,7 @@ def _counted(made: Iterator[Events], fired: Callable[[int], None]) -> Iterator[E
         del events  # or they would stay while the next ones are made
 
 
-def _limited(made: Iterator[Events], most: int) -> Iterator[Events]:
+def limited(made: Iterator[Events], most: int) -> Iterator[Events]:
     """Yield the events, up to `most`; more are an error."""
     count = 0
     for events in made:
@@ -331,50 +350,88 @@ def _limited(made: Iterator[Events], most: int) -> Iterator[Events]:
         del events  # or they would stay while the next ones are made
 
 
-def _pixel_events(
-    frames: Frames,
-    config: Config,
-    hooks: Sequence[Hooks],
-    table: NDArray[np.float32] | None,
-    complete: Callable[[int], None] | None,
-    given: GivenFlow | None,
-    **options: Any,
-) -> Iterator[Events]:
-    """Yield the sorted events of the pixels, as they are before the readout.
+class Pixels:
+    """The pixels of a sensor, which frames come to; their events, as they are before the readout.
 
-    `options`: further arguments of the pixel array.
+    Parameters
+    ----------
+    t_ns, first : int, (rows, columns)
+        Time and light of the first frame, or its grey values with a `table`.
+    hooks : sequence of Hooks
+        Effects that have begun, in signal order.
+    **options
+        Further arguments of :class:`adv2e.pixel.array.PixelArray`.
     """
-    t_ns, first = next(frames)
-    array = PixelArray(
-        config.pixel,
-        config.sampling,
-        config.seed,
-        first if table is None else table.take(first),
-        t_ns,
-        hooks=hooks,
-        **options,
-    )
-    intervals = Intervals(t_ns, first, config.sampling, threads=array.threads, given=given)
-    del first
-    # the main thread cannot be interrupted in compiled code
-    apart = array.threads > 1 or threading.current_thread() is threading.main_thread()
-    with worker_pool(array.threads) if apart else nullcontext() as pool:
-        order = InOrder()
-        for part in intervals.parts(frames):
+
+    def __init__(
+        self, t_ns: int, first: NDArray[Any], config: Config, hooks: Sequence[Hooks],
+        table: NDArray[np.float32] | None, given: GivenFlow | None = None, **options: Any,
+    ) -> None:  # fmt: skip
+        light = first if table is None else table.take(first)
+        self.array = PixelArray(
+            config.pixel, config.sampling, config.seed, light, t_ns, hooks=hooks, **options
+        )
+        threads = self.array.threads
+        self.intervals = Intervals(t_ns, first, config.sampling, threads=threads, given=given)
+        self.order = InOrder()
+        self._hooks, self._table = hooks, table
+
+    def events(
+        self, frames: Frames, pool: ThreadPoolExecutor | None,
+        complete: Callable[[int], None] | None = None, *, ends: bool = True,
+    ) -> Iterator[Events]:  # fmt: skip
+        """Yield the sorted events up to the last of the frames that follow.
+
+        Unless they end there, those of its microsecond wait for others; see :meth:`Intervals.parts`
+        for what else may.
+        """
+        for part in self.intervals.parts(frames, ends=ends):
             end_us, count = (part.times_ns[-1] + 500) // 1000, 0
-            for events in array.advance_part(part, table, pool):
+            for events in self.array.advance_part(part, self._table, pool):
                 count += events.size
-                yield from order.add(events, end_us)
+                yield from self.order.add(events, end_us)
                 del events  # or they would stay while the next ones are made
             if complete is not None:
                 complete(end_us)
-            intervals.expect(count)
-            for hook in hooks:
+            self.intervals.expect(count)
+            for hook in self._hooks:
                 hook.passed(part.times_ns[-1] * 1e-9)
-        yield order.rest()
+        if ends:
+            yield self.order.rest()
+
+    def state(self) -> dict[str, Any]:
+        """Return all that the events to come depend on; not copied.
+
+        Rows of the state of the pixels that nothing wrote to are left out.
+        """
+        rows = {k: row for k, row in enumerate(self.array.state) if row.view(np.int64).any()}
+        kept = {"rows": rows, "started": self.array.started, "held": self.order.held}
+        return {**kept, "intervals": self.intervals.state()}
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Go on from a state."""
+        for k, row in enumerate(self.array.state):
+            row[:] = state["rows"].get(k, 0.0)
+        self.array.started, self.order.held = state["started"], state["held"]
+        self.intervals.load(state["intervals"])
 
 
-def _check_causes(hooks: Sequence[Hooks], config: Config) -> None:
+def warm(config: Config, kind: NDArray[Any], **options: Any) -> None:
+    """Compile, or load, all that frames of the type and channels of one need.
+
+    `options`: those of :func:`simulate`.
+    """
+    config = replace(config, sensor=None)
+    white = config.frames.full_scale or full_scale_of(kind.dtype)
+    flashes = np.array([0.1, 0.9, 0.1, 0.9, 0.9]).reshape(-1, *[1] * kind.ndim) * white
+    frames = np.broadcast_to(flashes, (5, 32, 32, *kind.shape[2:])).astype(kind.dtype)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for _ in simulate(frames, 100.0, config, **options):
+            pass
+
+
+def check_all_causes(hooks: Sequence[Hooks], config: Config) -> None:
     """Raise ConfigError where the causes of events cannot be told."""
     check_causes(hooks)
     if config.pixel.high_pass and config.pixel.photoreceptor_noise:

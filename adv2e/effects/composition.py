@@ -7,14 +7,14 @@ import traceback
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import reduce
-from itertools import chain
+from itertools import chain, starmap
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.causes import CAUSED_DTYPE, FRAME_COUPLING, OWN_EFFECT, with_cause
-from adv2e.effects.hooks import INJECTED_DTYPE, Frames, Hooks, Times, View
+from adv2e.effects.hooks import INJECTED_DTYPE, Frames, Hooks, LightFrame, Times, View
 from adv2e.errors import Adv2eError, ConfigError, DataError, one_line
 from adv2e.events import EVENT_DTYPE, Events
 
@@ -30,8 +30,13 @@ COURSES: dict[str, tuple[str, int | None, np.ufunc]] = {
 """Courses by time that act on the pixels: method, index in its result, and how effects combine."""
 
 
+_IN_PARTS = {"light": ("light_now",), "events": ("events_now", "events_left")}
+"""Methods that may stand in the place of another."""
+
+
 def overrides(hook: Hooks, method: str) -> bool:
-    return getattr(type(hook), method) is not getattr(Hooks, method)
+    methods = (method, *_IN_PARTS.get(method, ()))
+    return any(getattr(type(hook), one) is not getattr(Hooks, one) for one in methods)
 
 
 def begin(hooks: Sequence[Hooks], frames: Frames, seed: int) -> Frames:
@@ -56,10 +61,18 @@ def begin(hooks: Sequence[Hooks], frames: Frames, seed: int) -> Frames:
     return chain([(t_ns, light)], frames)
 
 
-def _light(hook: Hooks, frames: Frames, shape: tuple[int, ...]) -> Frames:
+def light_now(hooks: Sequence[Hooks], t_ns: int, light: Array) -> LightFrame:
+    """Return a frame after the first as the pixel sees it, where no effect looks ahead."""
+    for hook in hooks:
+        if overrides(hook, "light"):
+            ((t_ns, light),) = _light(hook, iter([(t_ns, light)]), light.shape, now=True)
+    return t_ns, light
+
+
+def _light(hook: Hooks, frames: Frames, shape: tuple[int, ...], now: bool = False) -> Frames:
     source = _Watched(frames)
     with blamed(hook, source):
-        for t_ns, light in hook.light(source):
+        for t_ns, light in starmap(hook.light_now, source) if now else hook.light(source):
             if np.shape(light) != shape:
                 raise DataError(
                     f"effect {hook.name}: light: a frame of shape {np.shape(light)},"
@@ -169,24 +182,27 @@ def _injection_complaint(found: Array, start_s: float, stop_s: float, view: View
 
 
 def map_events(
-    hooks: Iterable[Hooks], chunks: Iterable[Events], causes: bool = False
+    hooks: Iterable[Hooks], chunks: Iterable[Events], causes: bool = False, *, ends: bool = True
 ) -> Iterator[Events]:
     """Yield the events that leave the last of the effects: one array at least.
 
-    With `causes`, all know theirs: what an effect returns without is its own.
+    With `causes`, all know theirs: what an effect returns without is its own.  Where it does not
+    end, effects that do not look ahead keep what may follow others that are still to come.
     """
     chunks = iter(chunks)
     for hook in hooks:
         if overrides(hook, "events"):
-            chunks = _events(hook, chunks, CAUSED_DTYPE if causes else EVENT_DTYPE)
+            chunks = _events(hook, chunks, CAUSED_DTYPE if causes else EVENT_DTYPE, ends)
     return chunks
 
 
-def _events(hook: Hooks, chunks: Iterator[Events], dtype: np.dtype[Any]) -> Iterator[Events]:
+def _events(
+    hook: Hooks, chunks: Iterator[Events], dtype: np.dtype[Any], ends: bool
+) -> Iterator[Events]:
     last, nothing = -np.inf, True
     source = _Watched(chunks)
     with blamed(hook, source):
-        for made in hook.events(source):
+        for made in hook.events(source) if ends else map(hook.events_now, source):
             if not isinstance(made, np.ndarray) or made.dtype not in (EVENT_DTYPE, dtype):
                 raise DataError(f"effect {hook.name}: events: must yield arrays of EVENT_DTYPE")
             events = made if made.dtype == dtype else with_cause(made, OWN_EFFECT)

@@ -24,6 +24,7 @@ are functions of what they are for (:meth:`View.uniforms`), and `gain`, `drive`,
 
 from __future__ import annotations
 
+import itertools
 import re
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
@@ -33,7 +34,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from adv2e.events import Events
+from adv2e.events import Events, empty_events
 from adv2e.kernel import rng
 from adv2e.parameters import Section
 
@@ -152,9 +153,14 @@ class Hooks:
     def light(self, frames: Frames) -> Frames:
         """Return the frames, changed; of the same size, at increasing times.
 
-        It may hold back as many as it needs, and must not write into those it is given.
+        It may hold back as many as it needs, and must not write into those it is given.  Where it
+        needs none that is still to come, :meth:`light_now` is enough.
         """
-        return frames
+        return itertools.starmap(self.light_now, frames)
+
+    def light_now(self, t_ns: int, light: NDArray[Any]) -> LightFrame:
+        """Return a frame, changed: in the place of :meth:`light`, for cameras in a loop, too."""
+        return t_ns, light
 
     def gain(self, times_s: Times) -> NDArray[Any] | None:
         """Return factors on the light, (n,) or (n, rows, columns), above 0."""
@@ -187,9 +193,26 @@ class Hooks:
         """Yield the events, changed; sorted within and across chunks.
 
         It may hold back as many as it needs (see :class:`adv2e.effects.reorder_buffer.InOrder`),
-        and must not write into those it is given.
+        and must not write into those it is given.  As :meth:`events_now` and :meth:`events_left`
+        in its place, it is for cameras in a loop, too.
         """
-        yield from chunks
+        yield from map(self.events_now, chunks)
+        yield self.events_left()
+
+    def events_now(self, events: Events) -> Events:
+        """Return those of the events so far that are to come out now, changed."""
+        return events
+
+    def events_left(self) -> Events:
+        """Return the events that were held back, at the end."""
+        return empty_events()
+
+    @property
+    def looks_ahead(self) -> bool:
+        """True if frames, or events, are needed that are still to come."""
+        return any(
+            getattr(type(self), whole) is not getattr(Hooks, whole) for whole in ("light", "events")
+        )
 
     def longest_step_us(self, start_s: float, stop_s: float) -> float:
         """Return the longest time step that resolves what it adds between two times [us].

@@ -19,7 +19,7 @@ class InOrder:
     """Hands events on in order; events at and after the time up to which all are known wait."""
 
     def __init__(self) -> None:
-        self._held: Events | None = None
+        self.held: Events | None = None
 
     def add(self, events: Events, end_us: int) -> Iterator[Events]:
         """Yield the events whose order is final once `events` are in.
@@ -31,23 +31,28 @@ class InOrder:
         end_us : int
             No event before this time will come any more [us].
         """
-        if self._held is None:
-            self._held = events[:0]
-        if self._held.size:
-            split = count_before(events, int(self._held["t"].max()) + 1)
-            border = sort_events(np.concatenate([self._held, events[:split]]))
+        if self.held is None:
+            self.held = events[:0]
+        if self.held.size:
+            split = count_before(events, int(self.held["t"].max()) + 1)
+            border = sort_events(np.concatenate([self.held, events[:split]]))
             keep = count_before(border, end_us)
-            self._held = border[keep:]
+            self.held = border[keep:]
             if keep:
                 yield border[:keep]
             events = events[split:]
         keep = count_before(events, end_us)
         if keep < events.size:
-            self._held = np.concatenate([self._held, events[keep:]])
+            self.held = np.concatenate([self.held, events[keep:]])
         if keep:
             yield events[:keep]
 
+    def known(self, events: Events, end_us: int) -> Events:
+        """Return the events of :meth:`add` in one array."""
+        found = list(self.add(events, end_us))
+        return found[0] if len(found) == 1 else np.concatenate([events[:0], *found])
+
     def rest(self) -> Events:
-        rest = empty_events() if self._held is None else self._held
-        self._held = rest[:0]
+        rest = empty_events() if self.held is None else self.held
+        self.held = rest[:0]
         return rest

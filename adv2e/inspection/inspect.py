@@ -20,7 +20,7 @@ from adv2e.formats.registry import may_hold_events
 from adv2e.label import Label
 from adv2e.light.decoding import light_line, light_text
 from adv2e.options import EventInput, InfoOptions, SourceOptions, chosen, declared, takes
-from adv2e.sources import OPENERS, PICTURES, STDIN, Source, open_source
+from adv2e.sources import OPENERS, PICTURES, STDIN, Source, is_live, open_source
 from adv2e.sources.frame import Light
 from adv2e.sources.stored import EVENTS, LIST
 from adv2e.sources.times.rates import seconds
@@ -71,15 +71,19 @@ def info(
     >>> found["width"], found["height"], found["events"]["count"]
     (4, 3, 2)
     """
-    path = Path(path)
-    check_ends(path)
-    if str(path) == STDIN or _has_only_frames(path):
+    given, path = path, Path(path)
+    if is_live(given):
+        if options["stop_s"] is None and "://" not in str(given):
+            raise UsageError(f"{given}: a camera has no end: --stop S says when to stop")
+    else:
+        check_ends(path)
+    if str(path) == STDIN or is_live(given) or _has_only_frames(path):
         if options["size"] is not None and options["pixel_format"] is None:
             raise UsageError(
                 "--size is that of raw video here, of which --pixel-format says the rest: frames"
                 " are described as they are"
             )
-        source = open_source(path, **chosen(SourceOptions, options))
+        source = open_source(given, **chosen(SourceOptions, options))
         return _of_source(source, progress or (lambda done, total: None))
     for name in ("fps", "timestamps", "bayer", "pixel_format", "allow_damaged"):
         if options.get(name):

@@ -18,7 +18,7 @@ from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.cascade import advance as cascade
 from adv2e.kernel.cascade import screen as cascade_screen
 from adv2e.kernel.comparator import with_room
-from adv2e.kernel.inputs import EXACT, Circuit, Interval, load
+from adv2e.kernel.inputs import EXACT, Circuit, Interval, load, rests
 from adv2e.kernel.lanes import batch, rows
 from adv2e.kernel.leak import leak_strip, leaks, lower_references
 from adv2e.kernel.photoreceptor import strip as photoreceptor
@@ -26,7 +26,6 @@ from adv2e.kernel.quadrature import Rule
 from adv2e.kernel.work_queue import STRIP, claim
 
 _f = np.float32
-_BLOCK = 256
 
 
 class StripMemory(NamedTuple):
@@ -62,30 +61,11 @@ def covers(circuit: Circuit) -> bool:
 
 
 @kernel
-def _alike(a, b):
-    """Tell whether two rows of grey values are equal."""
-    changes = np.uint8(0)
-    for k in range(a.shape[0]):
-        # narrow on purpose: as many at a time as there are bytes in a vector
-        changes = np.uint8(changes | np.uint8(a[k] ^ b[k]))
-    return changes == 0
-
-
-@kernel
 def _rests(schedule, f, first, count):
-    """Tell whether the grey values of a strip are those of the instant before."""
-    frames, before, share = schedule.frames, schedule.before, schedule.share
-    if not frames.coded or share[f] != _f(1.0) or share[f + 1] != _f(1.0):
-        return False
-    if before[f + 1] != before[f] + 1:
-        return False
-    now = before[f + 1] + 1
-    for lo in range(first, first + count, _BLOCK):
-        hi = min(lo + _BLOCK, first + count)
-        # slices: indices that count from zero need no test of their sign, which vectors bear ill
-        if not _alike(frames.codes[now - 1, lo:hi], frames.codes[now, lo:hi]):
-            return False
-    return True
+    """Tell whether a strip's light is that of the instant before, as both frames are the same."""
+    before = schedule.before[f + 1]
+    at_frame = schedule.before[f] == before - 1 and schedule.share[f] == _f(1.0)
+    return (at_frame or schedule.before[f] == before) and rests(schedule, f + 1, first, count)
 
 
 @kernel

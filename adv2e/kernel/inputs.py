@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from adv2e.compiled import kernel
 
 _f = np.float32
+_BLOCK = 256
 
 # codes of the update forms
 EXACT, FIRST_ORDER_HOLD, ZERO_ORDER_HOLD, EULER, PAPER = range(5)
@@ -129,3 +130,30 @@ def load(frames, before, share, first, floor, out):
         for k in range(out.shape[0]):
             a = light_before[k]
             out[k] = max(a + (light[k] - a) * share, low)
+
+
+@kernel
+def _alike(a, b):
+    """Tell whether two rows of whole numbers are equal."""
+    changes = a.dtype.type(0)
+    for k in range(a.shape[0]):
+        # narrow on purpose: as many at a time as there are in a vector
+        changes = a.dtype.type(changes | a.dtype.type(a[k] ^ b[k]))
+    return changes == 0
+
+
+@kernel
+def rests(schedule, at, first, count):
+    """Tell whether the frames on both sides of an instant are the same for a strip."""
+    frames, before = schedule.frames, schedule.before[at]
+    for lo in range(first, first + count, _BLOCK):
+        hi = min(lo + _BLOCK, first + count)
+        # slices: indices that count from zero need no test of their sign, which vectors bear ill
+        if frames.coded:
+            same = _alike(frames.codes[before, lo:hi], frames.codes[before + 1, lo:hi])
+        else:
+            a, b = frames.light[before, lo:hi], frames.light[before + 1, lo:hi]
+            same = _alike(a.view(np.int32), b.view(np.int32))
+        if not same:
+            return False
+    return True

@@ -17,7 +17,7 @@ from adv2e.compiled import kernel
 from adv2e.kernel import per_pixel
 from adv2e.kernel.borrowing import borrowed
 from adv2e.kernel.comparator import TIE, fire, with_room
-from adv2e.kernel.inputs import EXACT, Circuit
+from adv2e.kernel.inputs import EXACT, Circuit, rests
 from adv2e.kernel.stepped import events, rows
 from adv2e.kernel.stepped.driver import ROOM, TimeStep, load_x
 from adv2e.kernel.stepped.signal import NO_POLE, log_of_light
@@ -167,14 +167,31 @@ def _strip(lo, count, schedule, circuit, injected, state, memory, buffer, number
     """Advance one strip over all intervals."""
     schedule, injected, state, memory = borrowed(schedule, injected, state, memory)
     strip, starts = memory.strip, schedule.starts
+    f, intervals = np.int64(0), starts.shape[0] - 1
+    if _happens_alone(circuit) and not schedule.begins:
+        while f < intervals:
+            end = _next_frame(schedule, f, intervals)
+            if not rests(schedule, end, lo, count):
+                break
+            f = end
+        if f == intervals:  # no signal moves, so that none meets a level
+            return number, buffer
     for k in range(count):
         strip[rows.REFERENCE + k] = state[per_pixel.REFERENCE, lo + k]
         events.watch(k, lo + k, circuit, injected, state, strip)
-    load_x(schedule, 0, lo, count, circuit, memory, rows.XA)
-    f, intervals = np.int64(0), starts.shape[0] - 1
+    if schedule.begins:
+        load_x(schedule, 0, lo, count, circuit, memory, rows.XA)
+    else:
+        for k in range(count):
+            strip[rows.XA + k] = state[per_pixel.X, lo + k]
+    f = np.int64(0)
     while f < intervals:
         end = _next_frame(schedule, f, intervals)
-        load_x(schedule, end, lo, count, circuit, memory, rows.XB)
+        if rests(schedule, end, lo, count):
+            for k in range(count):
+                strip[rows.XB + k] = strip[rows.XA + k]
+        else:
+            load_x(schedule, end, lo, count, circuit, memory, rows.XB)
         m = _may_fire(count, rows.XB, starts[end] + 1.0, strip, memory.pixels)
         if m > 0:
             number, buffer = _go_through(

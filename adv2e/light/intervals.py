@@ -101,6 +101,7 @@ class Intervals:
         linear = sampling.interpolation == "linear" or sampling.L == 1
         self._upsampler = None if linear else make_upsampler(sampling, threads=threads, given=given)
         self._first = t_ns, first
+        self._number, self._before_ns = 0, t_ns
         per_frame = self._L if linear else 1
         frames = max(2, min(_MOST // per_frame + 2, FRAME_BYTES // max(1, first.nbytes)))
         # behind the border: up to two frames of it, and one that looks ahead
@@ -117,8 +118,10 @@ class Intervals:
         wanted = int(EVENTS * self._size / max(events, 1))
         self._size = max(1, min(self._most, 4 * self._size, wanted))
 
-    def parts(self, frames: Iterator[LightFrame]) -> Iterator[Part]:
-        """Yield the parts of the frames that follow the first; each is used up before the next.
+    def parts(self, frames: Iterator[LightFrame], *, ends: bool = True) -> Iterator[Part]:
+        """Yield the parts of the frames that follow; each is used up before the next.
+
+        Unless they end there, more may follow in a later call, where interpolation is linear.
 
         Raises
         ------
@@ -133,12 +136,26 @@ class Intervals:
             if len(self._instants) > (1 if long else self._size) + ahead:
                 yield self._part(len(self._instants) - 1 - ahead)
                 self._drop(len(self._instants) - 1 - ahead)
-        if len(self._instants) > 1:
-            yield self._part(len(self._instants) - 1)
+        if ends and self._number == 0:
+            raise DataError("a single frame: at least two are needed")
+        left = len(self._instants) - 1 - (0 if ends else ahead)
+        if left > 0:
+            yield self._part(left)
+            self._drop(left)
+
+    def state(self) -> tuple[Any, ...]:
+        """Return the frames held, and all else that later parts depend on; not copied."""
+        return self._held[: self._count], self._instants, self._number, self._before_ns
+
+    def load(self, state: tuple[Any, ...]) -> None:
+        """Go on from a state."""
+        held, self._instants, self._number, self._before_ns = state
+        self._count = len(held)
+        self._held[: self._count] = held
 
     def _checked(self, frames: Iterator[LightFrame]) -> Iterator[LightFrame]:
-        number, before_ns = 0, self._first[0]
-        for number, (now_ns, now) in enumerate(frames, start=1):
+        for number, (now_ns, now) in enumerate(frames, start=self._number + 1):
+            before_ns = self._before_ns
             if now_ns <= before_ns:
                 raise DataError(
                     f"frame {number}: its time {now_ns * 1e-9:.9f} s is not after the one before"
@@ -156,9 +173,7 @@ class Intervals:
                     " the times in another unit?"
                 )
             yield now_ns, now
-            before_ns = now_ns
-        if number == 0:
-            raise DataError("a single frame: at least two are needed")
+            self._number, self._before_ns = number, now_ns
 
     def _hold(self, frame: NDArray[Any]) -> int:
         self._held[self._count] = frame
@@ -169,13 +184,12 @@ class Intervals:
         upsampler = self._upsampler
         if upsampler is None:
             count = self._L
-            before_ns = self._first[0]
             for now_ns, now in frames:
+                before_ns = self._before_ns
                 self._hold(now)
                 for step in range(1, count + 1):
                     share, t_ns = step / count, instant_ns(before_ns, now_ns, step, count)
                     yield _Instant(self._count - 2, share, t_ns, step == count)
-                before_ns = now_ns
             return
         for (start_ns, a), (stop_ns, b), beside in neighbours(chain([self._first], frames)):
             count = upsampler.count(a, b, beside)

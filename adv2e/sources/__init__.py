@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,7 +49,8 @@ def open_source(path: str | Path, **options: Unpack[SourceOptions]) -> Source:
     ----------
     path : path
         Video file, folder or zip of images, recording of a data set, TIFF of several pages,
-        or ``.npy`` stack; "-" is standard input, through which Y4M or raw video comes.
+        or ``.npy`` stack; "-" is standard input, through which Y4M or raw video comes; a number, or
+        ``/dev/video0``, is a camera; an address with `network`.
     **options
         See :class:`adv2e.options.SourceOptions`.  Of a list, each line is ``t`` or ``t name``: see
         :mod:`adv2e.sources.times.lists`.
@@ -81,6 +83,18 @@ def open_source(path: str | Path, **options: Unpack[SourceOptions]) -> Source:
         from adv2e.sources.pipes import source as pipe  # noqa: PLC0415  (needs OpenCV)
 
         return pipe.open_source(given, selection, pixel_format=pixel_format, size=size)
+    if is_live(path):
+        is_camera = "://" not in str(path)
+        if not is_camera and not options["network"]:
+            raise DataError(
+                f"{without_password(path)}: an address: --network lets it be read, or download it"
+                " first"
+            )
+        if along is not None:
+            raise UsageError("--motion moves before one picture: INPUT must be its file")
+        from adv2e.sources import live  # noqa: PLC0415  (needs PyAV)
+
+        return live.open_source(str(path), given, selection, is_camera=is_camera)
     named, path = str(path), Path(path)
     try:
         check_ends(path)
@@ -97,10 +111,31 @@ def open_source(path: str | Path, **options: Unpack[SourceOptions]) -> Source:
     return source
 
 
+def without_password(address: str | Path) -> str:
+    """Return an address as it is told, and stored."""
+    return re.sub(r"//[^/]*@", "//", str(address))
+
+
+def is_live(path: str | Path) -> bool:
+    """Tell whether an input is a camera or an address: not if a file or folder is called so.
+
+    A camera is a number, or a device such as ``/dev/video0``.
+    """
+    text = str(path)
+    if "://" in text or re.fullmatch(r"/dev/video\d+", text):
+        return True
+    return re.fullmatch(r"\d{1,3}", text, re.ASCII) is not None and not Path(text).exists()
+
+
+def check_stored(path: str | Path) -> None:
+    """Refuse (DataError) a camera or an address where frames of a recording are wanted."""
+    if is_live(path):
+        told = without_password(path)
+        raise DataError(f"{told}: a camera or an address, which adv2e convert and info read alone")
+
+
 def _advice(path: str) -> str:
-    """Return advice on a missing path that looks like an address or a pattern, else ''."""
-    if "://" in path:
-        return "; addresses are not read: download it first"
+    """Return advice on a missing path that looks like a pattern, else ''."""
     if any(character in path for character in "*?%"):
         return "; patterns are not read: give the folder of the images"
     return ""

@@ -43,6 +43,9 @@ from adv2e.sources.paths import SensorPath
 from adv2e.sources.times.rates import NS_PER_S, FrameRate, Rate, parse_rate, seconds
 from adv2e.ticks import check_time
 
+LIVE = ("camera", "network")
+"""Kinds of sources whose frames come when they please, and are lost where nobody takes them."""
+
 
 class Source(ABC):
     """Frames in the order of time, and what is known of them before they are read.
@@ -54,7 +57,8 @@ class Source(ABC):
     inputs : list of str or Path
         Files that are read, and the folder they are in: where nothing may be written.
     kind : str
-        ``video``, ``images``, ``npy``, or the data set that it is of, such as ``davis240c``.
+        ``video``, ``images``, ``npy``, one of `LIVE`, or the data set that it is of, such as
+        ``davis240c``.
     width, height : int
         Columns and rows of the frames, of the part that is cut out of them where one is.
     dtype : numpy.dtype
@@ -191,7 +195,7 @@ class Source(ABC):
     def doubt_of_white(self, largest: float | None) -> str:
         """Return a warning if `largest`, the largest number, is far below white, else ''."""
         known = self._white_told is not None or self.full_scale != full_scale_of(self.dtype)
-        decoded = self.kind == "video" and self.dtype == np.uint8
+        decoded = self.kind in ("video", *LIVE) and self.dtype == np.uint8
         if largest is None or known or decoded:
             return ""
         told = doubt_of_white(largest, self.dtype, self.path)
@@ -254,6 +258,8 @@ class Source(ABC):
         return 0 if self.has_clock else first.t_ns
 
     def _too_few(self, count: int, span_ns: int) -> DataError:
+        if self.ended_by_hand is not None:
+            raise KeyboardInterrupt  # nothing came that could be kept
         found = "no frames" if count == 0 else "a single frame"
         if not self.selection.is_timed:
             return DataError(f"{self.path}: {found}; at least two are needed")

@@ -99,6 +99,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "crop": (1, 2, 30, 20),
         "bayer": "GBRG",
         "pixel_format": None,
+        "network": False,
         "size": (8, 6),
         "rotate180": True,
         "motion": "pan",

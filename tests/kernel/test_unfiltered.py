@@ -69,10 +69,11 @@ def test_events_are_those_of_the_stepped_solver(circuits, frames, case, causes):
     np.testing.assert_array_equal(found, stepped)
 
 
+@pytest.mark.parametrize("most", [1, 7])  # within the instants between two frames
 @pytest.mark.parametrize("case", CASES)
-def test_events_do_not_depend_on_threads_or_on_where_parts_end(monkeypatch, frames, case):
+def test_events_do_not_depend_on_threads_or_on_where_parts_end(monkeypatch, frames, case, most):
     found = events_of(frames, case, threads=1)
-    monkeypatch.setattr(intervals, "_MOST", 7)  # within the instants between two frames
+    monkeypatch.setattr(intervals, "_MOST", most)
     np.testing.assert_array_equal(events_of(frames, case, threads=3), found)
 
 

@@ -133,7 +133,7 @@ def test_missing_input(tmp_path):
     [
         ("frames/%04d.png", "give the folder of the images"),
         ("frames/*.png", "give the folder of the images"),
-        ("https://a.b/c.mp4", "https://a.b/c.mp4: no such file or folder; addresses are not read"),
+        ("https://a.b/c.mp4", "https://a.b/c.mp4: an address: --network lets it be read"),
         ("", "the input has no name"),
     ],
 )

@@ -21,7 +21,7 @@ from adv2e.formats.reading import read_events
 from adv2e.geometry import Size
 from adv2e.light.decoding import decoder_for
 from adv2e.light.sensor import check_beside
-from adv2e.sources import open_source
+from adv2e.sources import check_stored, open_source
 from adv2e.sources.frame import Frame
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, read_image
 
@@ -151,6 +151,7 @@ def _numbers(frame: Frame) -> NDArray[np.float32]:
 
 
 def _video(path: str | Path) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    check_stored(path)
     source = open_source(path)
     frames = list(source.frames())
     times_ns = np.array([frame.t_ns for frame in frames], np.int64)

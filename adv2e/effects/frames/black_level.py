@@ -33,7 +33,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.effects.hooks import Frames, Hooks
+from adv2e.effects.hooks import Hooks, LightFrame
 
 LABELS = {"black_level": "black level of the frames"}
 SEPARATED_BY = {
@@ -52,12 +52,11 @@ class BlackLevelHooks(Hooks):
         super().__init__()
         self._dn, self._depth = dn, depth_dn
 
-    def light(self, frames: Frames) -> Frames:
-        for t_ns, light in frames:
-            made = light + light.dtype.type(self._dn)
-            if self._depth:
-                made -= self._below(light)
-            yield t_ns, np.maximum(made, 0)
+    def light_now(self, t_ns: int, light: NDArray[Any]) -> LightFrame:
+        made = light + light.dtype.type(self._dn)
+        if self._depth:
+            made -= self._below(light)
+        return t_ns, np.maximum(made, 0)
 
     def _below(self, light: NDArray[Any]) -> NDArray[Any]:
         """Return the depth of each pixel below black [DN]."""

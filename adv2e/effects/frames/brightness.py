@@ -66,13 +66,14 @@ def check_floats(image: NDArray[Any], label: str, full_scale: float | None) -> N
         check_white(float(image.max()), label, full_scale)
 
 
-def bounded(frames: Frames, table: NDArray[np.float32] | None) -> Frames:
+def bounded(frames: Frames, table: NDArray[np.float32] | None, begin: int = 0) -> Frames:
     """Yield (t_ns, light) as they come, light and time of each looked at; names a frame it refuses.
 
-    `table`: light [DN] of the values of frames that are not decoded yet.
+    `table`: light [DN] of the values of frames that are not decoded yet; `begin`: number of the
+    first.
     """
     harmless = table is not None and float(table.max()) <= BRIGHTEST * _WHITE
-    for number, (t_ns, light) in enumerate(frames):
+    for number, (t_ns, light) in enumerate(frames, begin):
         check_time(t_ns, f"frame {number}")
         if not harmless:
             check_light(light if table is None else table.take(light), f"frame {number}")

@@ -18,7 +18,11 @@ References
 
 from __future__ import annotations
 
-from adv2e.effects.hooks import Frames, Hooks
+from typing import Any
+
+from numpy.typing import NDArray
+
+from adv2e.effects.hooks import Hooks, LightFrame, View
 
 LABELS = {"clock_drift": "drift of the frames' clock"}
 SEPARATED_BY = {
@@ -30,13 +34,17 @@ class ClockDriftHooks(Hooks):
     """Stretches the times of the frames by `ppm`."""
 
     stage = "frames"
+    _first_ns: int | None = None
 
     def __init__(self, ppm: float) -> None:
         super().__init__()
         self._ppm = ppm
 
-    def light(self, frames: Frames) -> Frames:
-        first_ns: int | None = None
-        for t_ns, light in frames:
-            first_ns = t_ns if first_ns is None else first_ns
-            yield t_ns + round((t_ns - first_ns) * self._ppm * 1e-6), light
+    def begin(self, view: View) -> None:
+        super().begin(view)
+        self._first_ns = None
+
+    def light_now(self, t_ns: int, light: NDArray[Any]) -> LightFrame:
+        if self._first_ns is None:
+            self._first_ns = t_ns
+        return t_ns + round((t_ns - self._first_ns) * self._ppm * 1e-6), light

@@ -19,7 +19,11 @@ References
 
 from __future__ import annotations
 
-from adv2e.effects.hooks import Frames, Hooks
+from typing import Any
+
+from numpy.typing import NDArray
+
+from adv2e.effects.hooks import Hooks, LightFrame
 
 LABELS = {"clock_offset": "offset of the frames' clock"}
 SEPARATED_BY = {
@@ -36,6 +40,5 @@ class ClockOffsetHooks(Hooks):
         super().__init__()
         self._offset_ns = round(offset_us * 1e3)
 
-    def light(self, frames: Frames) -> Frames:
-        for t_ns, light in frames:
-            yield t_ns + self._offset_ns, light
+    def light_now(self, t_ns: int, light: NDArray[Any]) -> LightFrame:
+        return t_ns + self._offset_ns, light

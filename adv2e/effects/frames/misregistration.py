@@ -31,7 +31,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.effects.hooks import Frames, Hooks
+from adv2e.effects.hooks import Hooks, LightFrame
 
 LABELS = {"misregistration": "shift of the frames"}
 SEPARATED_BY = {
@@ -118,6 +118,5 @@ class MisregistrationHooks(Hooks):
         super().__init__()
         self._shift_px = shift_px
 
-    def light(self, frames: Frames) -> Frames:
-        for t_ns, light in frames:
-            yield t_ns, shifted(light, self._shift_px)
+    def light_now(self, t_ns: int, light: NDArray[Any]) -> LightFrame:
+        return t_ns, shifted(light, self._shift_px)

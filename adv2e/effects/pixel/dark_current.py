@@ -18,8 +18,11 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from adv2e.effects.hooks import Frames, Hooks
+from numpy.typing import NDArray
+
+from adv2e.effects.hooks import Hooks, LightFrame
 from adv2e.parameters import Fit, Section, parameter
 
 SEPARATED_BY = {
@@ -44,6 +47,5 @@ class DarkCurrentHooks(Hooks):
 
     Parameters = DarkCurrent
 
-    def light(self, frames: Frames) -> Frames:
-        for t_ns, light in frames:
-            yield t_ns, light + light.dtype.type(self.parameters.dn)
+    def light_now(self, t_ns: int, light: NDArray[Any]) -> LightFrame:
+        return t_ns, light + light.dtype.type(self.parameters.dn)

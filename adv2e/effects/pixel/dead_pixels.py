@@ -11,7 +11,6 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +47,6 @@ class DeadPixelsHooks(Hooks):
         drawn = rng.uniform_array(view.seed, rng.DEAD_CHOICE, pixels, 0)
         self._alive = (drawn >= self.parameters.fraction).reshape(view.rows, view.columns)
 
-    def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
-        for events in chunks:
-            yield events[self._alive[events["y"], events["x"]]]
+    def events_now(self, events: Events) -> Events:
+        seen: Events = events[self._alive[events["y"], events["x"]]]
+        return seen

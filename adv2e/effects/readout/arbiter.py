@@ -24,7 +24,6 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,19 +83,25 @@ class ArbiterHooks(Hooks):
         self._numbers = np.zeros(pixels, np.int64)
         # counted from the first frame: an epoch time would lose nanoseconds in rounding
         self._origin_us = round(view.start_s * 1e6)
+        self._asking, self._order = InOrder(), InOrder()
 
-    def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
-        asking, order = InOrder(), InOrder()
-        for events in chunks:
-            if not events.size:
-                continue
-            # those of the last microsecond wait for others of it, which may ask before them
-            for whole in asking.add(events, int(events["t"][-1])):
-                known_us = float(whole["t"][-1] - self._origin_us) + 0.5
-                served = self._served(whole, known_us)
-                if served.size:
-                    yield from order.add(sort_events(served), int(served["t"][-1]))
-        yield from order.add(sort_events(self._served(asking.rest(), np.inf)), _FAR_US)
+    def events_now(self, events: Events) -> Events:
+        """Return the events that have left the channel."""
+        if not events.size:
+            return events
+        # those of the last microsecond wait for others of it, which may ask before them
+        whole = self._asking.known(events, int(events["t"][-1]))
+        if not whole.size:
+            return whole
+        served = self._served(whole, float(whole["t"][-1] - self._origin_us) + 0.5)
+        if not served.size:
+            return served
+        return self._order.known(sort_events(served), int(served["t"][-1]))
+
+    def events_left(self) -> Events:
+        """Return the events that still waited."""
+        served = self._served(self._asking.rest(), np.inf)
+        return self._order.known(sort_events(served), _FAR_US)
 
     def _served(self, events: Events, known_us: float) -> Events:
         """Return the events that leave the channel before `known_us`, in that order."""

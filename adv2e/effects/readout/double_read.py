@@ -20,7 +20,6 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,24 +69,26 @@ class DoubleReadHooks(Hooks):
     def begin(self, view: View) -> None:
         super().begin(view)
         self._numbers = np.zeros(view.rows * view.columns, np.int64)
+        self._order = InOrder()
 
-    def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
-        order = InOrder()
-        for events in chunks:
-            if not events.size:
-                continue
-            pixels = pixels_of(events, self.view.columns)
-            drawn = rng.next_uniforms(self.view.seed, rng.DOUBLE_READ, pixels, self._numbers)
-            share = np.where(events["p"] > 0, self.parameters.on, self.parameters.off)
-            twice = drawn < share
-            # what is drawn below the share is as even as what is drawn at all
-            quarter = np.floor(4.0 * drawn[twice] / share[twice]).astype(np.int64)
-            both, second = events.copy(), events[twice]
-            second["t"] += quarter % 2
-            if self.parameters.polarity == "on":
-                is_first = quarter >= 2
-                second["p"] = np.where(is_first, second["p"], 1)
-                both["p"][np.flatnonzero(twice)[is_first]] = 1
-            last = int(events["t"][-1])
-            yield from order.add(sort_events(np.concatenate([both, second])), last)
-        yield order.rest()
+    def events_now(self, events: Events) -> Events:
+        if not events.size:
+            return events
+        pixels = pixels_of(events, self.view.columns)
+        drawn = rng.next_uniforms(self.view.seed, rng.DOUBLE_READ, pixels, self._numbers)
+        share = np.where(events["p"] > 0, self.parameters.on, self.parameters.off)
+        twice = drawn < share
+        # what is drawn below the share is as even as what is drawn at all
+        quarter = np.floor(4.0 * drawn[twice] / share[twice]).astype(np.int64)
+        both, second = events.copy(), events[twice]
+        second["t"] += quarter % 2
+        if self.parameters.polarity == "on":
+            is_first = quarter >= 2
+            second["p"] = np.where(is_first, second["p"], 1)
+            both["p"][np.flatnonzero(twice)[is_first]] = 1
+        last = int(events["t"][-1])
+        return self._order.known(sort_events(np.concatenate([both, second])), last)
+
+    def events_left(self) -> Events:
+        """Return the events of the last microsecond, which waited for second readings."""
+        return self._order.rest()

@@ -12,7 +12,6 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,8 +51,8 @@ class EventLossHooks(Hooks):
         super().begin(view)
         self._numbers = np.zeros(view.rows * view.columns, np.int64)
 
-    def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
-        for events in chunks:
-            pixels = pixels_of(events, self.view.columns)
-            drawn = rng.next_uniforms(self.view.seed, rng.LOSS, pixels, self._numbers)
-            yield events[drawn >= self.parameters.fraction]
+    def events_now(self, events: Events) -> Events:
+        pixels = pixels_of(events, self.view.columns)
+        drawn = rng.next_uniforms(self.view.seed, rng.LOSS, pixels, self._numbers)
+        kept: Events = events[drawn >= self.parameters.fraction]
+        return kept

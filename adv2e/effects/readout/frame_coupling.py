@@ -42,6 +42,7 @@ import math
 from bisect import bisect_left
 from collections import deque
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,34 +137,38 @@ class FrameCouplingHooks(Hooks):
         # of each leap: its time, and the sum of what all up to it have left at that time
         self._leaps: list[float] = []
         self._sums: list[float] = []
+        self._number = 0
         if self._period_s:
             lasts_s = self._rise_s + self._width_s + _FADED * self._tau_s
             first_s = view.start_s - _SAME_S - lasts_s - self._delay_s
             self._next = math.ceil(first_s / self._period_s)
 
+    @property
+    def looks_ahead(self) -> bool:
+        """True if frames disturb what was before them."""
+        return not self._period_s and self._delay_s < 0.0
+
     def light(self, frames: Frames) -> Frames:
         """Yield the frames as they are, each once all leaps before it are known."""
-        if self._period_s:
-            yield from self._light_beside(frames)
-            return
-        ahead_ns = max(0, math.ceil(-self._delay_s * 1e9))
+        ahead_ns = math.ceil(-self._delay_s * 1e9) if self.looks_ahead else 0
         held: deque[LightFrame] = deque()
-        for number, frame in enumerate(frames):
-            leap_s = frame[0] * 1e-9 + self._delay_s
-            if number % self._every == 0 and leap_s >= self.view.start_s - _SAME_S:
-                self._leap(leap_s)
-            held.append(frame)
+        for frame in frames:
+            held.append(self.light_now(*frame))
             while held and held[0][0] + ahead_ns <= frame[0]:
                 yield held.popleft()
         yield from held
 
-    def _light_beside(self, frames: Frames) -> Frames:
-        """Yield frames that are not those read out."""
-        for frame in frames:
-            while (leap_s := self._next * self._period_s + self._delay_s) <= frame[0] * 1e-9:
+    def light_now(self, t_ns: int, light: NDArray[Any]) -> LightFrame:
+        if self._period_s:  # other frames than this one
+            while (leap_s := self._next * self._period_s + self._delay_s) <= t_ns * 1e-9:
                 self._leap(leap_s)
                 self._next += 1
-            yield frame
+            return t_ns, light
+        leap_s = t_ns * 1e-9 + self._delay_s
+        if self._number % self._every == 0 and leap_s >= self.view.start_s - _SAME_S:
+            self._leap(leap_s)
+        self._number += 1
+        return t_ns, light
 
     def _leap(self, time: float) -> None:
         left = 0.0

@@ -16,12 +16,10 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.effects.hooks import Hooks
+from adv2e.effects.hooks import Hooks, View
 from adv2e.effects.reorder_buffer import InOrder
 from adv2e.events import Events, sort_events
 
@@ -46,13 +44,18 @@ class TimestampTickHooks(Hooks):
         super().__init__()
         self._tick_us = tick_us
 
-    def events(self, chunks: Iterable[Events]) -> Iterator[Events]:
-        """Yield the events at their ticks; those of the last tick wait for others of it."""
-        order = InOrder()
-        for events in chunks:
-            if not events.size:
-                continue
-            stamped = events.copy()
-            stamped["t"] = ticked(events["t"], self._tick_us)
-            yield from order.add(sort_events(stamped), int(stamped["t"][-1]))
-        yield order.rest()
+    def begin(self, view: View) -> None:
+        super().begin(view)
+        self._order = InOrder()
+
+    def events_now(self, events: Events) -> Events:
+        """Return the events at their ticks; those of the last tick wait for others of it."""
+        if not events.size:
+            return events
+        stamped = events.copy()
+        stamped["t"] = ticked(events["t"], self._tick_us)
+        return self._order.known(sort_events(stamped), int(stamped["t"][-1]))
+
+    def events_left(self) -> Events:
+        """Return the events of the last tick."""
+        return self._order.rest()

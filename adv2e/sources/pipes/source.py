@@ -199,8 +199,3 @@ class PipeSource(Source):
             self._note(f"{NAME}: ended by hand (Ctrl-C) after {number} frames")
             if fault:
                 self._note(f"{fault}: the first {number} are taken")
-
-    def _too_few(self, count: int, span_ns: int) -> DataError:
-        if self.ended_by_hand is not None:
-            raise KeyboardInterrupt  # nothing came that could be kept
-        return super()._too_few(count, span_ns)
