@@ -20,8 +20,8 @@ from adv2e.reports.markup import Markup, Wording, join, tag
 from adv2e.reports.quantities import estimate_text
 from adv2e.reports.result import ROLES, Band, Curve, ErrorRow, Estimate, Snapshot
 
-WIDTH, _PLOT_HEIGHT = 360, 160
-_LEFT, _RIGHT = 58, 14
+WIDTH, PLOT_HEIGHT = 360, 160
+LEFT, RIGHT = 58, 14
 _FEW_POINTS = 40
 """Up to as many, points of a line are marked."""
 
@@ -30,7 +30,7 @@ _SHOWN = 4
 
 
 @dataclass(frozen=True)
-class _Frame:
+class Frame:
     """The axes and the places of the points across."""
 
     across: Axis
@@ -115,10 +115,10 @@ def curve_chart(curve: Curve) -> Markup:
     Borders of bins are drawn as steps; values at the same place are points without a line.  What
     cannot be drawn (no number, or none that the logarithm has) leaves a gap.
     """
-    x_label = wrapped(curve.x_label, WIDTH - _LEFT)
+    x_label = wrapped(curve.x_label, WIDTH - LEFT)
     y_label = wrapped(curve.y_label, WIDTH)
     top = 14 + len(y_label) * LINE_HEIGHT
-    bottom = top + _PLOT_HEIGHT
+    bottom = top + PLOT_HEIGHT
     frame = _frame_of(curve, top, bottom)
     if frame is None:
         return tag("p", "There is nothing to draw: no value is known.", class_="note")
@@ -159,7 +159,7 @@ def _description(curve: Curve) -> str:
     )
 
 
-def _frame_of(curve: Curve, top: float, bottom: float) -> _Frame | None:
+def _frame_of(curve: Curve, top: float, bottom: float) -> Frame | None:
     x = drawable(curve.x)
     if curve.x_log and len(x) > len(curve.measured) and len(x) > 2 and x[0] <= 0 < x[1]:
         # bins that begin at zero: the first is drawn as wide as the second
@@ -168,14 +168,14 @@ def _frame_of(curve: Curve, top: float, bottom: float) -> _Frame | None:
     for band in (curve.before, curve.after):
         rows += [band.middle, band.low, band.high]
     tight = curve.x_log or len(x) > len(curve.measured)  # points may have room, bins need none
-    across = axis_over([x], _LEFT, WIDTH - _RIGHT, log=curve.x_log, tight=tight)
+    across = axis_over([x], LEFT, WIDTH - RIGHT, log=curve.x_log, tight=tight)
     up = axis_over([drawable(row) for row in rows], bottom, top, log=curve.y_log)
     if across is None or up is None:
         return None
     if curve.x_names:
         middles = 0.5 * (x[1:] + x[:-1])
         across = replace(across, names=list(zip(middles, curve.x_names, strict=True)))
-    return _Frame(across, up, across.place(x))
+    return Frame(across, up, across.place(x))
 
 
 def _dot(x: float, y: float, joined: bool) -> Markup:
