@@ -1,12 +1,13 @@
 """What a configured sensor does, measured on its simulation: thresholds, latency, noise, bandwidth.
 
 Known light falls on a few thousand pixels, which :mod:`adv2e.pixel` simulates, and events are
-counted.  No number follows from a formula of an effect, so that all effects act together.
-``docs/sensor.md`` defines each quantity.
+counted.  No number follows from a formula of an effect, so that all effects act together.  The
+docstring of each measure is the definition that stands beside its curve.
 """
 
 from __future__ import annotations
 
+import inspect
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -20,10 +21,9 @@ from numpy.typing import NDArray
 from adv2e import __version__
 from adv2e.causes import CAUSES
 from adv2e.config import Config, Written, load_config, names_of, to_dict
-from adv2e.config.active_effects import active_hooks
-from adv2e.config.model import Frames, Readout, Sampling
+from adv2e.config.model import Frames, Pixel, Sampling
 from adv2e.conversion.simulation import events_from_light
-from adv2e.effects.composition import begin, map_events
+from adv2e.effects.composition import begin
 from adv2e.effects.hooks import LightFrame
 from adv2e.effects.pixel.initial_reference import SETTLED
 from adv2e.effects.readout.arbiter import ArbiterHooks
@@ -34,35 +34,40 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 Array = NDArray[np.float64]
+Fired = NDArray[np.bool_]
 Found = dict[str, Any]
 
 _WHITE_DN = 255.0
-_LIGHT_DN: Array = _WHITE_DN * 10.0 ** (-0.5 * np.arange(6))
-"""Light levels of latency and noise; every other one also of thresholds and bandwidth [DN]."""
+_LIGHT_DN = np.geomspace(_WHITE_DN, _WHITE_DN * 10**-2.5, 6)
+"""Light levels of latency and noise; every other one also of thresholds and bandwidth."""
 _PIXELS, _WATCHED, _FEW = 4000, 1000, 500
-"""Pixels at a level: of thresholds; of noise; of latencies and bandwidth, where each tells more."""
-_SEEN_S = 0.2
-"""Time after a step in which an event counts."""
-_LATEST_S = 1.0
-"""The same for the latency."""
-_WATCHED_S = 10.0, 60.0
-"""Time for which noise is watched; the longer if shorter ones hold too few events."""
+"""Pixels at a level: of thresholds; of noise; of latency and bandwidth, where each tells more."""
+_SEEN_S, _LATEST_S = 0.2, 1.0
+"""Time after a step in which events count, of thresholds and of latency."""
+_WATCHED_S = 10, 60
+"""Time for which noise is watched: the longer where the shorter holds too few events."""
 _ENOUGH = 100
 _MOST_CONTRAST = 3.0
+_SMALL = 0.02
+"""Thresholds where bandwidth is measured: the corner moves with the light, if that moves much."""
 _BINS = 25
-_PER_DECADE, _CYCLES, _SAMPLES = 4, 10, 24
-"""Frequencies a decade; periods of a burst of flicker, and light values in each."""
-_DECADES = 5.0
-"""Of the frequencies, from 1 Hz on."""
-_FRAMES_HZ = 240.0
-"""Rate of frames for pixels that are advanced in steps, whose length acts on what they do."""
+_CYCLES, _SAMPLES = 10, 24
+"""Periods of a burst of flicker, and light values in each."""
 _FLICKERED_S = 0.1
 _LEAP_NS = 1000
-_SMALL = 0.02
-"""Thresholds where bandwidth is measured: the corner moves with the light, if that moves much [ln].
-"""
+_FRAMES_HZ = 240
+"""Rate of frames for pixels that are advanced in steps, whose length acts on what they do."""
 _LOADS = 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0, 1.1, 1.3, 2.0
 _SIZE = 346, 260
+"""Columns and rows of a sensor whose configuration does not say."""
+
+_KEYS_OF = {
+    "by leak": ("pixel.leak.rate_hz", "pixel.leak.photo_rate_hz"),
+    "by shot noise": ("pixel.shot_noise.rate_hz",),
+    "by photoreceptor noise": ("pixel.photoreceptor_noise.rms",),
+    "by hot pixel": ("pixel.hot_pixels.fraction", "pixel.hot_pixels.rate_hz"),
+}
+_CORNERS = ("low_pass.cutoff_hz", "low_pass.dark_cutoff_hz", "source_follower.cutoff_hz")
 
 
 @takes(SensorOptions)
@@ -83,8 +88,9 @@ def sensor(*configs: Written | Sequence[Written], **options: Unpack[SensorOption
         words, ``numbers`` and ``plots``.  A number has ``name``, ``at``, ``unit``, ``value``,
         ``low`` and ``high`` (95 % interval; without a value, the limit), and the ``keys`` of the
         configuration that it goes back to.  A plot has ``key``, ``title``, ``x_label`` and
-        ``y_label`` with units, ``x_log``, ``y_log``, ``definition``, ``mark`` (a value of y and its
-        name, or None) and ``series``: ``name``, ``x``, ``y``, ``low`` and ``high``, (points,) each.
+        ``y_label`` with units, ``log`` (axes that are logarithmic), ``definition``, ``mark`` (a
+        value of y and its name, or None) and ``series``: ``name``, ``x``, ``y``, ``low`` and
+        ``high``, (points,) each.
 
     Raises
     ------
@@ -105,13 +111,9 @@ def sensor(*configs: Written | Sequence[Written], **options: Unpack[SensorOption
 
 
 def measured(given: Sequence[tuple[str, Config]], **options: Any) -> Found:
-    """Return what :func:`sensor` does, of configurations with names, in that order."""
-    return {
-        "adv2e": __version__,
-        "contrast_ln": options["contrast"],
-        "white_lux": options["white_lux"],
-        "sensors": [_Bench(config, **options).found(name) for name, config in given],
-    }
+    """Return what :func:`sensor` does, of configurations with names."""
+    sensors = [_Bench(config, **options).found(name) for name, config in given]
+    return {"adv2e": __version__, **{"options": options}, "sensors": sensors}
 
 
 class _Bench:
@@ -120,232 +122,199 @@ class _Bench:
     def __init__(
         self, config: Config, contrast: float, white_lux: float | None, threads: int | None
     ) -> None:
-        self._contrast, self._threads, self._config = contrast, threads, config
+        self._config, self._contrast, self._threads = config, contrast, threads
         self._lux = None if white_lux is None else white_lux / _WHITE_DN
         pixel = config.pixel
-        update = "exact" if pixel.low_pass is None else pixel.low_pass.update
-        self._stepped = update != "exact"
+        self._stepped = pixel.low_pass is not None and pixel.low_pass.update != "exact"
         self._rate_hz = _FRAMES_HZ * config.sampling.L
-        highest = math.log10(self._rate_hz / 8.0) if self._stepped else _DECADES
-        self._tried_hz = 10.0 ** (np.arange(0, _PER_DECADE * highest + 0.5) / _PER_DECADE)
-        self._rest_ns = round(_SEEN_S * 1e9) if update == "paper" else 0
-        self._causes = not (pixel.high_pass and pixel.photoreceptor_noise)
+        decades = math.log10(self._rate_hz / 8) if self._stepped else 5.0
+        self._tried_hz = 10.0 ** np.arange(0.0, decades + 0.1, 0.25)
+        # with update: paper, pixels climb at first from where they begin
+        self._rest_ns = round(1e9 * _SEEN_S) if self._stepped else 0
         self._settled = replace(pixel, initial_reference=SETTLED)
-        alike = replace(pixel.thresholds, mismatch=0.0)
-        quiet: dict[str, Any] = dict.fromkeys(
+        off: dict[str, Any] = dict.fromkeys(
             ("leak", "shot_noise", "photoreceptor_noise", "hot_pixels", "dead_pixels")
         )
-        self._quiet = replace(self._settled, thresholds=alike, **quiet)
+        alike = replace(pixel.thresholds, mismatch=0.0)
+        self._quiet = replace(self._settled, thresholds=alike, **off)
         self._numbers: list[Found] = []
         self._plots: list[Found] = []
 
     def found(self, name: str) -> Found:
-        for measure in (self._thresholds, self._latency, self._noise, self._flicker, self._rate):
+        parts = self._thresholds, self._latency, self._noise, self._bandwidth, self._rate
+        for measure in (*parts, self._readout):
             measure()
-        self._readout()
-        return {
-            "name": name,
-            "config": to_dict(self._config),
-            "conditions": self._conditions(),
-            "numbers": self._numbers,
-            "plots": self._plots,
-        }
-
-    def _conditions(self) -> list[str]:
-        words = [
-            f"Light is what falls on the pixel, 255 DN being white{self._white()}; frames.* and"
-            " sampling.* are not used, and the readout is measured apart.",
-            "Intervals are of 95 %. The numbers hold for these pixels, drawn with seed"
-            f" {self._config.seed}.",
+        conditions = [
+            f"Light is what falls on the pixel; white is 255 DN{self._lux_text(_WHITE_DN)}. Keys of"
+            " frames and sampling are not used, and the readout is measured by itself. Intervals"
+            f" are of 95 %; pixels are drawn with seed {self._config.seed}.",
         ]
         if self._stepped:
-            words.append(
-                "The low-pass is advanced in steps, whose length acts on all numbers. Here light"
-                f" comes {self._rate_hz:g} times a second, as that of {_FRAMES_HZ:g} frames with"
-                f" this L, with K = {self._config.sampling.K} steps between, and a step of the"
-                " light takes as long as from one to the next."
+            conditions.append(
+                "The low-pass is advanced in steps, whose length acts on all numbers: here light"
+                f" comes {self._rate_hz} times a second, as of {_FRAMES_HZ} frames and this L, with"
+                f" K = {self._config.sampling.K}; a step takes from one to the next, and pixels"
+                f" rest for {_SEEN_S:g} s before it."
             )
-        if self._rest_ns:
-            words.append(
-                f"The pixels rest for {_SEEN_S:g} s before a step: with this update they climb from"
-                " where they begin, so that their references are no longer the signal."
-            )
-        return words
-
-    def _white(self) -> str:
-        return "" if self._lux is None else f" ({self._lux * _WHITE_DN:g} lux)"
+        return {
+            "name": name, "config": to_dict(self._config), "conditions": conditions,
+            "numbers": self._numbers, "plots": self._plots,
+        }  # fmt: skip
 
     # ---- The simulation.
 
-    def _events(self, frames: Iterator[LightFrame], pixel: Any, causes: bool = False) -> Events:
+    def _events(self, frames: Iterator[LightFrame], pixel: Pixel, causes: bool = False) -> Events:
+        """Return the events of pixels in light (rows, columns), after they have rested; t [us]."""
         config = replace(
-            self._config,
-            frames=Frames(),
-            sensor=None,
-            readout=None,
-            pixel=pixel,
+            self._config, frames=Frames(), sensor=None, readout=None, pixel=pixel,
             sampling=Sampling(L=1, K=self._config.sampling.K),
-        )
+        )  # fmt: skip
         if self._stepped:
-            frames = _sampled(frames, 1e9 / self._rate_hz)
+            t0, first = next(frames)
+            later = ((t + self._rest_ns, one) for t, one in itertools.chain([(t0, first)], frames))
+            frames = _sampled(itertools.chain([(t0, first)], later), 1e9 / self._rate_hz)
         made = events_from_light(frames, config, threads=self._threads, causes=causes)
-        return np.concatenate(list(made))
-
-    def _after_step(self, before: Array, after: Array, seen_s: float, pixel: Any) -> Events:
-        """Return the events after a step, (rows, columns) of light before and after; t [us]."""
-        low, high = before.astype(np.float32), after.astype(np.float32)
-        leaps = self._rest_ns + _LEAP_NS
-        ends = [(0, low), *[(self._rest_ns, low)] * bool(self._rest_ns), (leaps, high)]
-        events = self._events(iter([*ends, (leaps + round(seen_s * 1e9), high)]), pixel)
+        events = np.concatenate(list(made))
         events["t"] -= self._rest_ns // 1000
-        return events[events["t"] >= 0]
+        return np.asarray(events[events["t"] >= 0])
+
+    def _after_step(self, bright: Array, dim: Array, rises: Fired, seen_s: float) -> Events:
+        """Return the events of the steps' own polarity; of rows that rise, else fall."""
+        up = rises[:, None]
+        before, after = (np.where(up, *two) for two in ((dim, bright), (bright, dim)))
+        low, high = before.astype(np.float32), after.astype(np.float32)
+        frames = [(0, low), (_LEAP_NS, high), (_LEAP_NS + round(seen_s * 1e9), high)]
+        events = self._events(iter(frames), self._settled)
+        return events[events["p"] == rises[events["y"]]]
 
     # ---- What is measured.
 
     def _thresholds(self) -> None:
-        levels = _LIGHT_DN[::2]
-        bright = np.tile(np.repeat(levels, 2)[:, None], _PIXELS)
-        rises = np.arange(len(bright)) % 2 == 0
+        """Add thresholds.
 
-        def fired(contrast: Array) -> NDArray[np.bool_]:
-            dim = bright[:, : contrast.shape[1]] * np.exp(-contrast)
-            full = np.broadcast_to(bright[:, : contrast.shape[1]], dim.shape)
-            up = rises[:, None]
-            sides = np.where(up, dim, full), np.where(up, full, dim)
-            events = self._after_step(*sides, _SEEN_S, self._settled)
-            return _fired(events[events["p"] == rises[events["y"]]], dim.shape)
+        The light changes once: it rises to the level given, or falls from it, by a factor of 1 +
+        contrast, for pixels whose reference is the signal.  Share of them with an event of that
+        polarity within 200 ms; 4000 pixels a level, each with a contrast of its own, 160 a point.
+        """
+        rises = np.arange(6) % 2 == 0
+        levels = _LIGHT_DN[::2].repeat(2)
 
-        by_chance = fired(np.zeros((len(bright), _PIXELS))).mean(axis=1)
-        top = _reach(fired, len(bright))
-        contrast = top[:, None] * _ascending(_PIXELS)
+        def fired(contrast: Array) -> Fired:
+            bright = np.broadcast_to(levels[:, None], contrast.shape)
+            seen = self._after_step(bright, bright * np.exp(-contrast), rises, _SEEN_S)
+            return _fired(seen, contrast.shape)
+
+        by_chance = fired(np.zeros((6, _PIXELS))).mean(axis=1)
+        contrast = _reach(fired, 6)[:, None] * _ascending(_PIXELS)
         is_fired = fired(contrast)
         for up, word in ((True, "ON"), (False, "OFF")):
             series = []
             for row in np.flatnonzero(rises == up):
-                light = self._light(bright[row, 0])
-                series.append(self._curve(light, contrast[row], is_fired[row]))
+                at = self._at(levels[row])
+                series.append(_s_curve(at, contrast[row], is_fired[row]))
                 mean, spread = _moments(contrast[row], is_fired[row], by_chance[row])
-                key = f"pixel.thresholds.{word.lower()}"
-                self._number(f"contrast threshold, {word}", f"at {light}", "ln", *mean, key)
-                self._number(
-                    f"spread of the threshold over pixels, {word}", f"at {light}", "ln", *spread,
-                    "pixel.thresholds.mismatch",
-                )  # fmt: skip
-            fall = "rises to" if up else "falls from"
+                name = f"threshold, {word}"
+                self._number(f"contrast {name}", at, "ln", *mean, f"thresholds.{word.lower()}")
+                self._number(f"spread of the {name}", at, "ln", *spread, "thresholds.mismatch")
             self._plot(
-                f"s_curve_{word.lower()}", f"S-curve, {word}", "contrast: change of the light [%]",
-                f"share of pixels with an {word} event", True, False, series,
-                f"The light {fall} the level given, once, by a factor of 1 + contrast, for pixels"
-                f" whose reference is the signal; the share of them with an {word} event within"
-                f" {1e3 * _SEEN_S:g} ms. {_PIXELS} pixels a level, each with a contrast of its own;"
-                f" {_PIXELS // _BINS} a point.", (0.5, "half"),
+                self._thresholds, f"s_curve_{word.lower()}", f"S-curve, {word}",
+                "contrast: change of the light [%]", f"share of pixels with an {word} event",
+                series, "x", (0.5, "half"),
             )  # fmt: skip
 
     def _latency(self) -> None:
-        count = _FEW
-        bright = np.tile(_LIGHT_DN[:, None], count)
-        dim = bright * math.exp(-self._contrast)
-        sides = np.concatenate([dim, bright]), np.concatenate([bright, dim])
-        events = self._after_step(*sides, _LATEST_S, self._settled)
+        """Add the latency.
+
+        Time from a step of the light, which takes 1 us, to the first event of its polarity within
+        1 s; 500 pixels a point, whose reference is the signal.  Line: median, shaded: 10 to 90 % of
+        the pixels.  No point: fewer than half of the pixels had one.  Less than 1 us is given as 1.
+        """
+        levels = _LIGHT_DN.size
+        bright = np.tile(_LIGHT_DN, 2)[:, None].repeat(_FEW, axis=1)
+        rises = np.arange(2 * levels) < levels
+        seen = self._after_step(bright, bright * math.exp(-self._contrast), rises, _LATEST_S)
+        first = np.full(bright.shape, np.inf)
+        np.minimum.at(first, (seen["y"], seen["x"]), np.maximum(seen["t"], 1))
+        first.sort(axis=1)
+        apart = 0.98 / math.sqrt(_FEW)
+        ranks = [
+            first[:, math.ceil(share * _FEW) - 1]
+            for share in (0.1, 0.5 - apart, 0.5, 0.5 + apart, 0.9)
+        ]
         series = []
-        for up, word in ((1, "ON"), (0, "OFF")):
-            first = np.full((len(bright), count), np.inf)
-            own = events[(events["p"] == up) & (events["y"] // len(bright) == 1 - up)]
-            np.minimum.at(first, (own["y"] % len(bright), own["x"]), own["t"])
-            first.sort(axis=1)
-            first = np.maximum(first, 1.0)
-            at = [_ranked(first, share) for share in (0.5, 0.1, 0.9)]
-            series.append(self._series(word, self._x(_LIGHT_DN), *at))
-            half = 0.98 / math.sqrt(count)
-            ends = _ranked(first, 0.5 - half), _ranked(first, 0.5 + half)
-            for k in (0, len(bright) - 2):
-                self._number(
-                    f"latency, {word}, median over pixels", f"at {self._light(_LIGHT_DN[k])}", "us",
-                    at[0][k], (ends[0][k], ends[1][k]),
-                    "pixel.low_pass.cutoff_hz", "pixel.source_follower.cutoff_hz",
-                )  # fmt: skip
-        self._plot(
-            "latency", "Latency", self._x_label("the brighter side of the step"),
-            "first event after a step [us]: median, 10 to 90 % of the pixels", True, True, series,
-            f"Time of the first event of the step's polarity within {_LATEST_S:g} s after a step by"
-            f" {100 * math.expm1(self._contrast):.3g} % ({self._contrast:g} ln) that takes"
-            f" {_LEAP_NS / 1e3:g} us; {count} pixels a point, whose reference is the signal. No"
-            " point: fewer than half of the pixels had one. Less than 1 us is given as 1.",
-        )  # fmt: skip
+        for rows, word in ((slice(0, levels), "ON"), (slice(levels, None), "OFF")):
+            low, least, middle, most, high = (row[rows] for row in ranks)
+            series.append(_series(word, self._x(_LIGHT_DN), middle, low, high))
+            for k in (0, 4):
+                at, value = self._at(_LIGHT_DN[k]), (middle[k], least[k], most[k])
+                self._number(f"latency, {word}, median", at, "us", *value, *_CORNERS)
+        step = f"{100 * math.expm1(self._contrast):.3g} % ({self._contrast:g} ln)"
+        x_label = self._x_label("light at the bright side of the step")
+        y_label = f"first event after a step of {step} [us]"
+        self._plot(self._latency, "latency", "Latency", x_label, y_label, series)
 
     def _noise(self) -> None:
-        count = _WATCHED
-        light = np.tile(_LIGHT_DN[:, None], count).astype(np.float32)
-        for seconds in (_WATCHED_S[0],) if self._rest_ns else _WATCHED_S:
-            frames = ((t * 10**9, light) for t in range(int(seconds) + 1))
-            events = self._events(frames, self._config.pixel, self._causes)
-            if self._rest_ns:
-                events = events[events["t"] >= self._rest_ns // 1000]
-            watched = seconds - 1e-9 * self._rest_ns
+        """Add noise and leak.
+
+        Events of pixels at rest in constant light: the mean over 1000 pixels for 10 s, or for 60 s
+        where 10 s hold few events.  Shaded: 95 %, of the pixels' spread and of counting; where no
+        event came, up to the rate of three.  References begin as pixel.initial_reference says.
+        """
+        light = _LIGHT_DN[:, None].repeat(_WATCHED, axis=1).astype(np.float32)
+        causes = not (self._config.pixel.high_pass and self._config.pixel.photoreceptor_noise)
+        for seconds in _WATCHED_S[: 1 if self._stepped else 2]:
+            frames = ((t * 10**9, light) for t in range(seconds + 1))
+            events = self._events(frames, self._config.pixel, causes)
             if min(np.bincount(2 * events["y"] + events["p"], minlength=12)) >= _ENOUGH:
                 break
+        parts = {"ON": events["p"] == 1, "OFF": events["p"] == 0}
+        for number, name in enumerate(CAUSES if causes else ()):
+            if (chosen := events["cause"] == number).any():
+                parts[f"by {name.replace('_', ' ')}"] = chosen
         series = []
-        parts = {word: events["p"] == up for word, up in (("ON", 1), ("OFF", 0))}
-        if self._causes:
-            parts |= {
-                f"by {name.replace('_', ' ')}": events["cause"] == number
-                for number, name in enumerate(CAUSES)
-                if (events["cause"] == number).any()
-            }
         for word, chosen in parts.items():
-            own = events[chosen]
-            each = np.bincount(own["y"] * count + own["x"], minlength=light.size)
-            rate = each.reshape(light.shape) / watched
+            at = pixels_of(events[chosen], _WATCHED)
+            rate = np.bincount(at, minlength=light.size).reshape(light.shape) / seconds
             mean = rate.mean(axis=1)
-            error = np.maximum(rate.std(axis=1), np.sqrt(mean / watched)) / math.sqrt(count)
+            error = np.maximum(rate.std(axis=1), np.sqrt(mean / seconds)) / math.sqrt(_WATCHED)
             low, high = np.maximum(mean - 1.96 * error, 0.0), mean + 1.96 * error
-            high = np.where(mean > 0.0, high, 3.0 / (watched * count))
-            series.append(self._series(word, self._x(_LIGHT_DN), mean, low, high))
-            for k in (0, len(light) - 1):
-                self._number(
-                    f"noise events, {word}", f"at {self._light(_LIGHT_DN[k])}", "1/s a pixel",
-                    mean[k], (low[k], high[k]), *_KEYS_OF.get(word.removeprefix("by "), ()),
-                )  # fmt: skip
-        text = (
-            f"Events a pixel and second, the mean over {count} pixels at rest in constant light for"
-            f" {watched:g} s, with initial_reference: {self._config.pixel.initial_reference}."
-            " Shaded: 95 %, of the pixels' spread and of counting; where no event came, up to the"
-            " rate of three."
-        )
-        label = self._x_label("constant light")
-        for key, title, some in (
-            ("noise", "Noise and leak", series[:2]),
-            ("noise_by_cause", "Noise and leak by cause, ON and OFF together", series[2:]),
-        ):
-            if some:
-                unit = "events [1/s a pixel]"
-                self._plot(key, title, label, unit, True, True, some, text)
+            high = np.where(mean > 0.0, high, 3.0 / (seconds * _WATCHED))
+            series.append(_series(word, self._x(_LIGHT_DN), mean, low, high))
+            for k in (0, 5):
+                name, value = f"noise events, {word}", (mean[k], low[k], high[k])
+                keys = _KEYS_OF.get(word, ())
+                self._number(name, self._at(_LIGHT_DN[k]), "1/s a pixel", *value, *keys)
+        labels = self._x_label("constant light"), "events [1/s a pixel]"
+        self._plot(self._noise, "noise", "Noise and leak", *labels, series[:2])
+        if series[2:]:
+            title = "Noise and leak by cause, ON and OFF together"
+            self._plot(self._noise, "noise_by_cause", title, *labels, series[2:])
 
-    def _flicker(self) -> None:
+    def _bandwidth(self) -> None:
+        """Add the bandwidth.
+
+        A burst of 10 periods: ln(light) is a sine about the level given, which swells and fades
+        over 4 periods each.  The gain is the least amplitude that makes an event at any frequency
+        over the one that does at this; -3 dB: 0.707.  Small signals: thresholds are 0.02 ln here,
+        noise, leak and mismatch are off; 500 pixels a point, each with an amplitude of its own.
+        """
         levels = _LIGHT_DN[::2]
-        count = _FEW
         phase = np.arange(_CYCLES * _SAMPLES + 1) / _SAMPLES
         taper = np.sin(0.5 * np.pi * np.clip(np.minimum(phase, _CYCLES - phase) / 4, 0, 1)) ** 2
         wave = taper * np.sin(2.0 * np.pi * phase)
         both = replace(self._quiet.thresholds, on=_SMALL, off=_SMALL)
-        small = replace(self._quiet, thresholds=both)
+        pixel = replace(self._quiet, thresholds=both)
 
-        def fired(hz: float, amplitude: Array) -> NDArray[np.bool_]:
-            times = self._rest_ns + np.rint(1e9 * phase / hz).astype(np.int64)
-            if self._rest_ns:
-                times[0] = 0
+        def fired(hz: float, amplitude: Array) -> Fired:
+            times = np.rint(1e9 * phase / hz).astype(np.int64).tolist()
             light = (levels[:, None] * np.exp(amplitude * one) for one in wave)
-            frames = (
-                (t, now.astype(np.float32)) for t, now in zip(times.tolist(), light, strict=True)
-            )
-            events = self._events(frames, small)
-            return _fired(events[events["t"] >= self._rest_ns // 1000], amplitude.shape)
+            frames = ((t, now.astype(np.float32)) for t, now in zip(times, light, strict=True))
+            return _fired(self._events(frames, pixel), amplitude.shape)
 
-        tried = self._tried_hz[_PER_DECADE * self._stepped :]
-        top = _reach(partial(fired, tried[0]), len(levels))
-        least = np.full((0, len(levels)), np.nan)
+        tried = self._tried_hz[4 * self._stepped :]
+        top, least = _reach(partial(fired, tried[0]), 3), np.full((0, 3), np.nan)
         for hz in tried:
-            is_fired = fired(hz, top[:, None] * _ascending(count))
+            is_fired = fired(hz, top[:, None] * _ascending(_FEW))
             now = np.where(is_fired[:, -1], top * (1.0 - is_fired.mean(axis=1)), np.nan)
             least = np.concatenate([least, now[None]])
             best = np.fmin.reduce(least)
@@ -353,28 +322,24 @@ class _Bench:
                 break
             top = np.fmin(3.5 * now, _MOST_CONTRAST)
         gain, tried = best / least, tried[: len(least)]
-        series = [self._series(self._light(dn), tried, gain[:, k]) for k, dn in enumerate(levels)]
+        series = [_series(self._at(dn), tried, gain[:, k]) for k, dn in enumerate(levels)]
         for k, dn in enumerate(levels):
             self._number(
-                "bandwidth, -3 dB", f"at {self._light(dn)}", "Hz",
-                *_corner(tried, gain[:, k], 3.5 / count),
-                "pixel.low_pass.cutoff_hz", "pixel.low_pass.dark_cutoff_hz",
-                "pixel.source_follower.cutoff_hz",
-            )  # fmt: skip
-        self._plot(
-            "bandwidth", "Bandwidth", "frequency of the flicker [Hz]",
-            "gain: least amplitude that makes an event over that needed here", True, True, series,
-            f"A burst of {_CYCLES} periods: ln(light) is a sine about the level given, which swells"
-            " and fades over 4 periods each. The gain is the least amplitude that makes an event at"
-            " any frequency over the one that does at this; -3 dB: 0.707. Small signals: thresholds"
-            f" are {_SMALL:g} ln here, noise, leak and mismatch are off; {count} pixels a point, each"
-            " with an amplitude of its own.", (math.sqrt(0.5), "-3 dB"),
-        )  # fmt: skip
+                "bandwidth, -3 dB", self._at(dn), "Hz", *_corner(tried, gain[:, k]), *_CORNERS
+            )
+        y_label = "gain: least amplitude that makes an event over that needed here"
+        x_label, mark = "frequency of the flicker [Hz]", (math.sqrt(0.5), "-3 dB")
+        self._plot(self._bandwidth, "bandwidth", "Bandwidth", x_label, y_label, series, "xy", mark)
 
     def _rate(self) -> None:
-        tried = self._tried_hz[_PER_DECADE:]
+        """Add the highest rate.
+
+        Events of one pixel without noise and leak, in square flicker between 1 % and 100 % of
+        white: in the second half of 20 periods, or of 0.1 s if that is more.  Above the last point
+        no event came.
+        """
         sides = [np.full((1, 1), dn, np.float32) for dn in (0.01 * _WHITE_DN, _WHITE_DN)]
-        rates, least = [], math.inf
+        tried, rates, least = self._tried_hz[4:], [], math.inf
         for hz in tried:
             halves = 2 * max(20, math.ceil(_FLICKERED_S * hz))
             edges = [round(0.5e9 * k / hz) for k in range(halves + 1)]
@@ -388,122 +353,84 @@ class _Bench:
             least = min(least, float(np.diff(times).min(initial=math.inf)))
             if not rates[-1]:
                 break
-        tried = tried[: len(rates)]
-        rate = np.array(rates)
-        highest = int(rate.argmax())
-        key = "pixel.refractory.period_us"
-        at = f"light between 1 and 100 % of white, {tried[highest]:.3g} Hz"
-        self._number("highest rate of a pixel", at, "1/s", rate[highest], 0.0, key)
+        most, at = max(zip(rates, tried, strict=False)), "flicker between 1 and 100 % of white"
+        key = "refractory.period_us"
         self._number(
-            "least time between events of a pixel", "the same light, any frequency", "us", least,
-            (max(least - 1.0, 0.0), least + 1.0), key,
-        )  # fmt: skip
-        self._plot(
-            "rate", "Highest rate of one pixel", "frequency of the flicker [Hz]",
-            "events of a pixel [1/s]", True, True, [self._series("ON and OFF", tried, rate)],
-            f"Square flicker between 1 % and 100 % of white, of a pixel without noise and leak: the"
-            f" second half of 20 periods, or of {_FLICKERED_S:g} s if that is more. Above the last"
-            " point no event came.",
-        )  # fmt: skip
+            "highest rate of a pixel", f"{at}, {most[1]:.3g} Hz", "1/s", *most[:1] * 3, key
+        )
+        ends = max(least - 1.0, 0.0), least + 1.0
+        self._number("least time between events of a pixel", at, "us", least, *ends, key)
+        series = [_series("ON and OFF", tried[: len(rates)], np.array(rates))]
+        labels = "frequency of the flicker [Hz]", "events of a pixel [1/s]"
+        self._plot(self._rate, "rate", "Highest rate of one pixel", *labels, series)
 
     def _readout(self) -> None:
-        given = self._config.readout
+        """Add the readout.
+
+        Events at random times and pixels of the whole sensor go through the configuration's
+        arbiter.  Load: their rate over its capacity, the rate that leaves it where nearly all
+        pixels ask at once.  Delay: median, shaded: 10 to 90 % of the events.
+        """
+        given, size = self._config.readout, self._config.sensor
         if given is None or given.arbiter is None:
             return
-        size = self._config.sensor
         columns, rows = _SIZE if size is None else (size.width, size.height)
-        hooks = [
-            hook
-            for hook in active_hooks(replace(self._config, readout=Readout(arbiter=given.arbiter)))
-            if isinstance(hook, ArbiterHooks)
-        ]
-        most, _, _ = _served(hooks, columns, rows, 1e9, self._config.seed)
-        loads = np.array(_LOADS)
-        parts = [_served(hooks, columns, rows, most * one, self._config.seed) for one in loads]
-        sent, lost, delay = (np.array(part) for part in zip(*parts, strict=True))
-        keys = "readout.arbiter.event_ns", "readout.arbiter.row_ns"
-        sized = f"{columns}x{rows}" + " (the configuration has no size)" * (size is None)
-        self._number("capacity of the readout", sized, "1/s", most, 0.01 * most, *keys)
-        text = (
-            f"Events at random on {columns}x{rows} pixels go through the configuration's arbiter."
-            f" Load: their rate over its capacity, {most:.3g} events a second, which is what leaves"
-            " it where all pixels ask at once."
-        )
-        x_label = "load: rate of events over the capacity"
-        self._plot(
-            "readout_loss", "Readout: events lost", x_label, "share of events", False, False,
-            [self._series("lost", loads, lost), self._series("capacity used", loads, sent / most)],
-            text,
-        )  # fmt: skip
-        middle, low, high = delay.T
-        self._plot(
-            "readout_delay", "Readout: delay", x_label, "delay [us]: median, 10 to 90 %",
-            False, True, [self._series("delay", loads, middle, low, high)], text,
-        )  # fmt: skip
+        arbiter = ArbiterHooks(given.arbiter)
+        served = partial(_served, arbiter, columns, rows, self._config.seed)
+        most = served(1e9)[0]
+        parts = [served(most * load) for load in _LOADS]
+        sent, lost, *delay = (np.array(part) for part in zip(*parts, strict=True))
+        at = f"{columns}x{rows} pixels" + ", as the configuration has no size" * (size is None)
+        keys = "arbiter.event_ns", "arbiter.row_ns"
+        ends = 0.99 * most, 1.01 * most
+        self._number("capacity of the readout", at, "1/s", most, *ends, *keys, section="readout")
+        loads, x_label = np.array(_LOADS), f"load [{most:.3g} events a second]"
+        series = [_series("lost", loads, lost), _series("capacity used", loads, sent / most)]
+        title = "Readout: loss"
+        self._plot(self._readout, "readout_loss", title, x_label, "share", series, "")
+        delays, y_label = [_series("delay", loads, *delay)], "delay [us]"
+        self._plot(self._readout, "readout_delay", "Readout: delay", x_label, y_label, delays, "y")
 
     # ---- What is kept.
 
-    def _light(self, dn: float) -> str:
-        share = f"{100 * dn / _WHITE_DN:.3g} % of white"
-        return share if self._lux is None else f"{share} ({self._lux * dn:.3g} lux)"
+    def _lux_text(self, dn: float) -> str:
+        return "" if self._lux is None else f" ({self._lux * dn:.3g} lux)"
+
+    def _at(self, dn: float) -> str:
+        return f"{100 * dn / _WHITE_DN:.3g} % of white{self._lux_text(dn)}"
 
     def _x(self, dn: Array) -> Array:
         return dn / _WHITE_DN if self._lux is None else dn * self._lux
 
     def _x_label(self, what: str) -> str:
-        unit = "DN/255 of white" if self._lux is None else f"lux, white being 255 DN{self._white()}"
-        return f"{what} [{unit}]"
-
-    def _series(
-        self, name: str, x: Array, y: Array, low: Array | None = None, high: Array | None = None
-    ) -> Found:
-        rows = {"x": x, "y": y, "low": low, "high": high}
-        lists = {key: None if row is None else _plain(row) for key, row in rows.items()}
-        return {"name": name, **lists}
-
-    def _curve(self, name: str, contrast: Array, fired: NDArray[np.bool_]) -> Found:
-        """Return the share that fires in bins of the contrast, with Wilson's interval."""
-        share = fired.reshape(_BINS, -1).mean(axis=1)
-        middle = contrast.reshape(_BINS, -1).mean(axis=1)
-        z2 = 1.96**2 / (fired.size / _BINS)
-        centre = (share + z2 / 2) / (1 + z2)
-        half = np.sqrt(share * (1 - share) * z2 + z2**2 / 4) / (1 + z2)
-        return self._series(name, 100.0 * np.expm1(middle), share, centre - half, centre + half)
+        return f"{what} [{'DN/255 of white' if self._lux is None else 'lux'}]"
 
     def _plot(
-        self, key: str, title: str, x_label: str, y_label: str, x_log: bool, y_log: bool,
-        series: list[Found], definition: str, mark: tuple[float, str] | None = None,
+        self, measure: Callable[[], None], key: str, title: str, x_label: str, y_label: str,
+        series: list[Found], log: str = "xy", mark: tuple[float, str] | None = None,
     ) -> None:  # fmt: skip
+        definition = " ".join((inspect.getdoc(measure) or "").partition("\n\n")[2].split())
         self._plots.append(
             {
-                "key": key, "title": title, "x_label": x_label, "y_label": y_label,
-                "x_log": x_log, "y_log": y_log, "definition": definition, "series": series,
-                "mark": mark,
+                "key": key, "title": title, "x_label": x_label, "y_label": y_label, "log": log,
+                "definition": definition, "mark": mark, "series": series,
             }
         )  # fmt: skip
 
     def _number(
-        self, name: str, at: str, unit: str, value: float,
-        error: float | tuple[float, float], *keys: str,
+        self, name: str, at: str, unit: str, value: float, low: float, high: float, *keys: str,
+        section: str = "pixel",
     ) -> None:  # fmt: skip
-        """Keep a number; `error` is a standard error, or the ends of the interval."""
-        ends = error if isinstance(error, tuple) else (value - 1.96 * error, value + 1.96 * error)
-        shown = _plain([value, max(ends[0], 0.0), ends[1]])
-        self._numbers.append(
-            {
-                "name": name, "at": at, "unit": unit,
-                **dict(zip(("value", "low", "high"), shown, strict=True)), "keys": list(keys),
-            }
-        )  # fmt: skip
+        shown = dict(zip(("value", "low", "high"), _plain([value, low, high]), strict=True))
+        paths = [key if key.startswith("pixel.") else f"{section}.{key}" for key in keys]
+        self._numbers.append({"name": name, "at": at, "unit": unit, **shown, "keys": paths})
 
 
-_KEYS_OF = {
-    "leak": ("pixel.leak.rate_hz", "pixel.leak.photo_rate_hz"),
-    "shot noise": ("pixel.shot_noise.rate_hz",),
-    "photoreceptor noise": ("pixel.photoreceptor_noise.rms",),
-    "hot pixel": ("pixel.hot_pixels.fraction", "pixel.hot_pixels.rate_hz"),
-}
-"""Keys by what makes noise."""
+def _series(
+    name: str, x: Array, y: Array, low: Array | None = None, high: Array | None = None
+) -> Found:
+    rows = {"x": x, "y": y, "low": low, "high": high}
+    return {"name": name, **{key: None if r is None else _plain(r) for key, r in rows.items()}}
 
 
 def _plain(row: Array | Sequence[float]) -> list[float | None]:
@@ -514,7 +441,7 @@ def _ascending(count: int) -> Array:
     return (np.arange(count) + 0.5) / count
 
 
-def _fired(events: Events, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def _fired(events: Events, shape: tuple[int, ...]) -> Fired:
     found = np.zeros(shape, np.bool_)
     found[events["y"], events["x"]] = True
     return found
@@ -526,13 +453,13 @@ def _sampled(frames: Iterator[LightFrame], period_ns: float) -> Iterator[LightFr
     number = 0
     for t1, second in frames:
         while (t := round(number * period_ns)) <= t1:
-            yield t, first + (second - first) * np.float32(max(t - t0, 0) / (t1 - t0))
+            yield t, first + (second - first) * np.float32((t - t0) / max(t1 - t0, 1))
             number += 1
         t0, first = t1, second
     yield round(number * period_ns), first
 
 
-def _reach(fired: Callable[[Array], NDArray[np.bool_]], rows: int) -> Array:
+def _reach(fired: Callable[[Array], Fired], rows: int) -> Array:
     """Return a contrast well above that at which half of the pixels of each row fire, (rows,)."""
     tried = np.geomspace(0.01, _MOST_CONTRAST, 30)
     found = fired(np.tile(tried.repeat(40), (rows, 1))).reshape(rows, tried.size, 40).mean(axis=2)
@@ -540,17 +467,23 @@ def _reach(fired: Callable[[Array], NDArray[np.bool_]], rows: int) -> Array:
     return np.minimum(2.5 * half, _MOST_CONTRAST)
 
 
-def _moments(
-    contrast: Array, fired: NDArray[np.bool_], by_chance: float
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return mean and standard deviation of the thresholds over pixels, each with its error [ln].
+def _s_curve(name: str, contrast: Array, fired: Fired) -> Found:
+    """Return the share that fires in bins of the contrast [%], with Wilson's interval."""
+    share = fired.reshape(_BINS, -1).mean(axis=1)
+    z2 = 1.96**2 / (fired.size / _BINS)
+    centre = (share + z2 / 2) / (1 + z2)
+    half = np.sqrt(share * (1 - share) * z2 + z2**2 / 4) / (1 + z2)
+    middle = 100.0 * np.expm1(contrast.reshape(_BINS, -1).mean(axis=1))
+    return _series(name, middle, share, centre - half, centre + half)
+
+
+def _moments(contrast: Array, fired: Fired, by_chance: float) -> list[tuple[float, float, float]]:
+    """Return mean and standard deviation of the thresholds over pixels, with intervals [ln].
 
     By the method of Spearman and Karber, between the share that fires by chance and that which
-    fires with the largest contrasts; NaN if there is little between them.  The error is that of
-    drawing the pixels.
+    fires with the largest contrasts; NaN if there is little between them.
     """
-    step = contrast[1] - contrast[0]
-    last = fired[-fired.size // 8 :]
+    step, last = contrast[1] - contrast[0], fired[-fired.size // 8 :]
     most = last.mean()
     span = most - by_chance if most - by_chance > 0.5 else math.nan
     below = (most - fired) / span
@@ -558,57 +491,49 @@ def _moments(
     spread = math.sqrt(max(2.0 * step * (contrast * below).sum() - mean**2, 0.0))
     drawn = 0.5 * np.diff(fired.astype(np.float64), append=fired[-1]) ** 2
     ends = [math.sqrt(p * (1 - p) / n) for p, n in ((most, last.size), (by_chance, fired.size))]
-    error = math.hypot(
-        step * math.sqrt(drawn.sum()), (contrast[-1] - mean) * ends[0], mean * ends[1]
-    )
-    apart = step * math.sqrt((drawn * (contrast - mean) ** 2).sum()) / max(spread, step)
-    return (mean, error / span), (spread, apart / span)
+    error = math.hypot(step * drawn.sum() ** 0.5, (contrast[-1] - mean) * ends[0], mean * ends[1])
+    apart = step * (drawn * (contrast - mean) ** 2).sum() ** 0.5 / max(spread, step)
+    both = ((mean, 1.96 * error / span), (spread, 1.96 * apart / span))
+    return [(value, max(value - off, 0.0), value + off) for value, off in both]
 
 
-def _ranked(ordered: Array, share: float) -> Array:
-    """Return of each row the value that this share does not exceed; NaN if it is infinite."""
-    found = ordered[:, max(math.ceil(share * ordered.shape[1]) - 1, 0)]
-    return np.where(np.isfinite(found), found, np.nan)
-
-
-def _corner(hz: Array, gain: Array, step: float) -> tuple[float, tuple[float, float]]:
-    """Return where the gain falls for good by 3 dB, with an interval; else from where on it may.
-
-    `step`: of the amplitudes, as a share of the largest.
-    """
+def _corner(hz: Array, gain: Array) -> tuple[float, float, float]:
+    """Return where the gain falls for good by 3 dB, with an interval; else from where on it may."""
     above = np.flatnonzero(gain >= math.sqrt(0.5))
     k = int(above[-1]) if above.size else 0
     if k + 1 >= gain.size or not above.size or math.isnan(gain[k + 1]):
-        return math.nan, (hz[k] if above.size else math.nan, math.nan)
+        return math.nan, hz[k] if above.size else math.nan, math.nan
     # of one pole, this is a line
     left, right = np.log(1.0 / np.minimum(gain[k : k + 2], 0.999) ** 2 - 1.0)
     wide = math.log(hz[k + 1] / hz[k]) / (right - left)
-    at = hz[k] * math.exp(-wide * left)
-    off = math.exp(6.0 * wide * step)
-    return at, (at / off, at * off)
+    at, off = hz[k] * math.exp(-wide * left), math.exp(0.04 * wide)  # 1 % of the amplitude
+    return at, at / off, at * off
 
 
 def _served(
-    hooks: Sequence[ArbiterHooks], columns: int, rows: int, rate: float, seed: int
-) -> tuple[float, float, list[float]]:
-    """Return the rate that leaves the readout, the share lost, and quantiles of the delay [us]."""
+    arbiter: ArbiterHooks, columns: int, rows: int, seed: int, rate: float
+) -> tuple[float, float, float, float, float]:
+    """Return the rate that leaves the readout, the share lost, and delays [us].
+
+    These are the median, 10 % and 90 % of them.
+    """
     pixels = columns * rows
     count = max(200_000, 3 * pixels)
     draw = np.random.default_rng([seed, 1])
-    span_us = 1e6 * count / rate
-    where = draw.integers(pixels, size=count)
-    times = draw.uniform(0.0, span_us, count).astype(np.int64)
-    asked = sort_events(make_events(times, where % columns, where // columns, where & 1))
-    next(iter(begin(hooks, iter([(0, np.zeros((rows, columns), np.float32))]), seed)))
-    left = np.concatenate(list(map_events(hooks, iter([asked]), False)))
-    begins, ends = int(left["t"][0]), int(left["t"][-1])
+    where, times = draw.integers(pixels, size=count), draw.uniform(0.0, 1e6 * count / rate, count)
+    asked = sort_events(
+        make_events(times.astype(np.int64), where % columns, where // columns, where & 1)
+    )
+    next(begin([arbiter], iter([(0, np.zeros((rows, columns), np.float32))]), seed))
+    left = np.concatenate(list(arbiter.events([asked])))
     # what a pixel asks for while it waits is lost: an event is the first since the one before
     far = 1 << 40
-    given = np.sort(pixels_of(asked, columns).astype(np.int64) * far + asked["t"])
-    out = np.sort(pixels_of(left, columns).astype(np.int64) * far + left["t"])
-    before = np.append(out[0] // far * far - 1, out[:-1])
-    since = np.where(before // far == out // far, before, out // far * far - 1)
-    delay = (out - given[np.searchsorted(given, since, "right").clip(max=given.size - 1)]).clip(0)
-    late = delay[out % far > ends // 2]
-    quantiles = np.quantile(late, (0.5, 0.1, 0.9)).tolist()
-    return 1e6 * left.size / max(ends - begins, 1), 1.0 - left.size / count, quantiles
+    given, out = (
+        np.sort(pixels_of(one, columns).astype(np.int64) * far + one["t"]) for one in (asked, left)
+    )
+    before = np.maximum(np.append(-1, out[:-1]), out // far * far - 1)
+    delay = out - given[np.searchsorted(given, before, "right").clip(max=count - 1)]
+    late = np.maximum(delay[out % far > left["t"][-1] // 2], 0)
+    span_us = max(int(left["t"][-1] - left["t"][0]), 1)
+    middle, low, high = np.quantile(late, (0.5, 0.1, 0.9))
+    return 1e6 * left.size / span_us, 1.0 - left.size / count, middle, low, high

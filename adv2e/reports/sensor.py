@@ -188,9 +188,9 @@ def _chart(plot: Found, drawn: Sequence[tuple[Found, str]]) -> Markup:
     rows = [{key: _floats(one[key]) for key in ("x", "y", "low", "high")} for one, _ in drawn]
     ups = [row[key] for row in rows for key in ("y", "low", "high")]
     across = axis_over(
-        [row["x"] for row in rows], LEFT, WIDTH - RIGHT, log=plot["x_log"], tight=True
+        [row["x"] for row in rows], LEFT, WIDTH - RIGHT, log="x" in plot["log"], tight=True
     )
-    up = axis_over(ups, bottom, top, log=plot["y_log"])
+    up = axis_over(ups, bottom, top, log="y" in plot["log"])
     if across is None or up is None:
         return tag("p", "There is nothing to draw: no value is known.", class_="note")
     content = [tag("title", plot["title"]), draw_axes(across, up, x_label, y_label)]
