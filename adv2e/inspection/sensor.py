@@ -149,6 +149,8 @@ class _Bench:
             " frames and sampling are not used, and the readout is measured by itself. Intervals"
             f" are of 95 %; pixels are drawn with seed {self._config.seed}.",
         ]
+        if not (self._config.readout and self._config.readout.arbiter):
+            conditions.append("There is no readout limit in this configuration.")
         if self._stepped:
             conditions.append(
                 "The low-pass is advanced in steps, whose length acts on all numbers: here light"
@@ -176,7 +178,8 @@ class _Bench:
         made = events_from_light(frames, config, threads=self._threads, causes=causes)
         events = np.concatenate(list(made))
         events["t"] -= self._rest_ns // 1000
-        return np.asarray(events[events["t"] >= 0])
+        rested: Events = events[events["t"] >= 0]
+        return rested
 
     def _after_step(self, bright: Array, dim: Array, rises: Fired, seen_s: float) -> Events:
         """Return the events of the steps' own polarity; of rows that rise, else fall."""
@@ -247,7 +250,7 @@ class _Bench:
             series.append(_series(word, self._x(_LIGHT_DN), middle, low, high))
             for k in (0, 4):
                 at, value = self._at(_LIGHT_DN[k]), (middle[k], least[k], most[k])
-                self._number(f"latency, {word}, median", at, "us", *value, *_CORNERS)
+                self._number(f"latency, {word}, median", at, "us", *value)
         step = f"{100 * math.expm1(self._contrast):.3g} % ({self._contrast:g} ln)"
         x_label = self._x_label("light at the bright side of the step")
         y_label = f"first event after a step of {step} [us]"
@@ -343,11 +346,10 @@ class _Bench:
         for hz in tried:
             halves = 2 * max(20, math.ceil(_FLICKERED_S * hz))
             edges = [round(0.5e9 * k / hz) for k in range(halves + 1)]
-            frames = [(0, sides[1])]
-            for k, (now, then) in enumerate(itertools.pairwise(edges)):
-                leap = min(_LEAP_NS, (then - now) // 2)
-                frames += [(now + leap, sides[k % 2]), (then, sides[k % 2])]
-            times = self._events(iter(frames), self._quiet)["t"].astype(np.float64)
+            leap = min(_LEAP_NS, edges[1] // 2)
+            leaps = ((k, t) for k in range(halves) for t in (edges[k] + leap, edges[k + 1]))
+            frames = itertools.chain([(0, sides[1])], ((t, sides[k % 2]) for k, t in leaps))
+            times = self._events(frames, self._quiet)["t"].astype(np.float64)
             begins = 1e-3 * edges[halves // 2]
             rates.append(1e6 * np.count_nonzero(times >= begins) / (1e-3 * edges[-1] - begins))
             least = min(least, float(np.diff(times).min(initial=math.inf)))
@@ -410,12 +412,8 @@ class _Bench:
         series: list[Found], log: str = "xy", mark: tuple[float, str] | None = None,
     ) -> None:  # fmt: skip
         definition = " ".join((inspect.getdoc(measure) or "").partition("\n\n")[2].split())
-        self._plots.append(
-            {
-                "key": key, "title": title, "x_label": x_label, "y_label": y_label, "log": log,
-                "definition": definition, "mark": mark, "series": series,
-            }
-        )  # fmt: skip
+        labels = {"key": key, "title": title, "x_label": x_label, "y_label": y_label, "log": log}
+        self._plots.append({**labels, "definition": definition, "mark": mark, "series": series})
 
     def _number(
         self, name: str, at: str, unit: str, value: float, low: float, high: float, *keys: str,

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from adv2e.effects import EFFECTS
+from adv2e.config.tree import flat
+from adv2e.effects import EFFECTS, Effect
 from adv2e.reports.charts import (
     LEFT,
     LINE_HEIGHT,
@@ -41,8 +42,6 @@ def sensor_page(found: Found) -> str:
     for k, one in enumerate(sensors):
         for plot in one["plots"]:
             plots.setdefault(plot["key"], [None] * len(sensors))[k] = plot
-    without = [one["name"] for one in sensors if not _has_arbiter(one)]
-    readout = f"{', '.join(without)}: no readout limit in this configuration." if without else ""
     return document(
         f"Sensor {', '.join(names)}",
         tag("p", "Measured on simulated pixels by adv2e ", found["adv2e"], ".", class_="note"),
@@ -52,7 +51,6 @@ def sensor_page(found: Found) -> str:
             "section",
             tag("h2", "Curves"),
             tag("div", *(_figure(some, names) for some in plots.values()), class_="side"),
-            tag("p", readout, class_="note") if readout else "",
         ),
         *(
             tag(
@@ -74,8 +72,6 @@ def sensor_text(found: Found) -> str:
             f"  {number['name']:<40} {number_of(number):<40} {number['at']}"
             for number in one["numbers"]
         ]
-        if not _has_arbiter(one):
-            lines.append("  no readout limit in this configuration")
         lines += [f"  note: {text}" for text in one["conditions"]]
     return "\n".join(lines)
 
@@ -91,10 +87,6 @@ def number_of(number: Found) -> str:
     if None not in ends and ends[0] < ends[1]:
         text += f" ({interval_text(ends)})"
     return f"{text}, {100 * math.expm1(value):.3g} %" if unit == "ln" else text
-
-
-def _has_arbiter(sensor: Found) -> bool:
-    return any(plot["key"] == "readout_loss" for plot in sensor["plots"])
 
 
 def _conditions(sensors: Sequence[Found]) -> Markup:
@@ -122,8 +114,10 @@ def _numbers(sensors: Sequence[Found]) -> Markup:
 def _keys(sensor: Found) -> Markup:
     """Return a table of the configuration's keys of pixel and readout beside what was measured."""
     rows = []
-    for path, value in _values(sensor["config"], ""):
-        effect = next((one.name for one in EFFECTS if _belongs(path, one.paths)), "")
+    for path, value in flat(sensor["config"]):
+        if value is None or not path.startswith(("pixel.", "readout.")):
+            continue
+        effect = next((e.name for e in EFFECTS if f"{path}.".startswith(_sections(e))), "")
         measured = [
             tag("span", f"{number['name']}, {number['at']}: {number_of(number)}", class_="meaning")
             for number in sensor["numbers"]
@@ -132,23 +126,17 @@ def _keys(sensor: Found) -> Markup:
         meaning = tag("span", BUILT_IN[path].meaning if path in BUILT_IN else "", class_="meaning")
         command = tag("code", f"adv2e effects {effect}") if effect else ""
         declared = f"{value_text(value)} {unit_of(path)}".rstrip()
-        rows.append([join(path, meaning), declared, tag("div", *measured or "-"), command])
+        rows.append(
+            [join(path, meaning), declared, tag("div", *measured or "-", class_="long"), command]
+        )
     heads = Column("key"), Column("declared", number=True), Column("measured"), Column("more")
     return table(
         "keys of the pixel and the readout; effects that are off are left out", heads, rows
     )
 
 
-def _belongs(path: str, sections: Sequence[str]) -> bool:
-    return f"{path}.".startswith(tuple(f"{section}." for section in sections))
-
-
-def _values(tree: Any, path: str) -> list[tuple[str, Any]]:
-    if isinstance(tree, Mapping):
-        pairs = ((f"{path}.{key}" if path else str(key), part) for key, part in tree.items())
-        return [one for full, part in pairs for one in _values(part, full)]
-    shown = path.startswith(("pixel.", "readout.")) and tree is not None
-    return [(path, tree)] * shown
+def _sections(effect: Effect) -> tuple[str, ...]:
+    return tuple(f"{section}." for section in effect.paths)
 
 
 def _figure(plots: Sequence[Found | None], names: Sequence[str]) -> Markup:
@@ -166,7 +154,8 @@ def _figure(plots: Sequence[Found | None], names: Sequence[str]) -> Markup:
     if several and len(kinds) > 1:
         entries += [(f"measured dash{n % _HUES}", name) for n, name in enumerate(kinds)]
     items = [
-        tag("li", tag("svg", _key_line(hue), viewBox="0 0 26 8"), label) for hue, label in entries
+        tag("li", tag("svg", rule(0, 4, 26, 4, f"curve {hue}"), viewBox="0 0 26 8"), label)
+        for hue, label in entries
     ]
     return tag(
         "figure",
@@ -175,10 +164,6 @@ def _figure(plots: Sequence[Found | None], names: Sequence[str]) -> Markup:
         _chart(first, drawn),
         tag("figcaption", first["definition"], class_="note"),
     )
-
-
-def _key_line(hue: str) -> Markup:
-    return tag("line", x1=0, y1=4, x2=26, y2=4, class_=f"curve {hue}")
 
 
 def _chart(plot: Found, drawn: Sequence[tuple[Found, str]]) -> Markup:
