@@ -55,6 +55,7 @@ def command(
     import json
 
     from adv2e.config import load_config, names_of
+    from adv2e.config.files import find
     from adv2e.files.staging import Staging
     from adv2e.inspection.sensor import measured
     from adv2e.reports.sensor import sensor_page, sensor_text
@@ -65,13 +66,12 @@ def command(
             raise UsageError(f"-o {output}: must end in .html, or name a folder")
         outputs = [outputs[0] / f"sensor.{suffix}" for suffix in ("html", "json")]
     options.check_sets(sets, seed, None)
-    effects, layers = options.own_effects(effect_files), config_files
-    chosen = []
-    for name in sensors or ((),):
-        files = [*([name] if name else []), *layers]
-        label = names_of(files, sets) or "adv2e"
-        chosen.append((label, load_config(files, sets, seed, effects)))
-    inputs = options.files_given()
+    effects, chosen = options.own_effects(effect_files), []
+    for named in [[name] for name in sensors] or [[]]:
+        files = [*named, *config_files]
+        config = load_config(files, sets, seed, effects)
+        chosen.append((names_of(files, sets) or "adv2e", config))
+    inputs = [*options.files_given(), *map(find, sensors)]
     for path in outputs:
         Staging(overwrite, inputs).file(path)  # before the work: raises if it cannot be
     found = measured(chosen, **given)

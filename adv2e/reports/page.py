@@ -105,7 +105,7 @@ body {
   font: 15px/1.5 system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif;
 }
 main { max-width: 960px; margin: 0 auto; padding: 20px 20px 48px; }
-h1 { font-size: 1.2rem; margin: 0; overflow-wrap: anywhere; }
+h1 { font-size: 1.2rem; margin: 0; }
 h1 + .note { margin: 0; }
 h2 {
   font-size: 1.2rem; margin: 2.2em 0 0.5em; padding-bottom: 0.2em;
@@ -113,7 +113,7 @@ h2 {
 }
 h3 { font-size: 1rem; margin: 1.4em 0 0.3em; }
 p { margin: 0.5em 0; max-width: 46em; }
-p, li { overflow-wrap: anywhere; }
+p, li, h1, h2, td::before { overflow-wrap: anywhere; }
 td, th { overflow-wrap: break-word; }
 code { font: 0.92em ui-monospace, "SF Mono", Menlo, Consolas, monospace; }
 .note, .meaning { color: var(--soft); font-size: 0.87rem; }

@@ -104,7 +104,7 @@ def _numbers(sensors: Sequence[Found]) -> Markup:
     for k, one in enumerate(sensors):
         for number in one["numbers"]:
             row = cells.setdefault(number["name"], [[] for _ in sensors])
-            at = tag("span", f" {number['at']}", class_="note")
+            at = tag("span", f" at {number['at']}", class_="note")
             row[k].append(tag("span", number_of(number), at, class_="value"))
     columns = [Column("quantity"), *(Column(one["name"]) for one in sensors)]
     rows = [[name, *(tag("div", *each or "-") for each in row)] for name, row in cells.items()]
@@ -118,11 +118,9 @@ def _keys(sensor: Found) -> Markup:
         if value is None or not path.startswith(("pixel.", "readout.")):
             continue
         effect = next((e.name for e in EFFECTS if f"{path}.".startswith(_sections(e))), "")
-        measured = [
-            tag("span", f"{number['name']}, {number['at']}: {number_of(number)}", class_="meaning")
-            for number in sensor["numbers"]
-            if path in number["keys"]
-        ]
+        of = (one for one in sensor["numbers"] if path in one["keys"])
+        texts = (f"{one['name']}, at {one['at']}: {number_of(one)}" for one in of)
+        measured = [tag("span", text, class_="meaning") for text in texts]
         meaning = tag("span", BUILT_IN[path].meaning if path in BUILT_IN else "", class_="meaning")
         command = tag("code", f"adv2e effects {effect}") if effect else ""
         declared = f"{value_text(value)} {unit_of(path)}".rstrip()
