@@ -18,9 +18,9 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1670,
+    "": 1692,
     "batches": 1515,
-    "cli": 1235,
+    "cli": 1300,
     "comparison": 1165,
     "compilation": 285,
     "config": 1315,
@@ -30,14 +30,14 @@ LIMITS = {
     "exporting": 1075,
     "files": 785,
     "formats": 5110,
-    "inspection": 260,
+    "inspection": 635,
     "kernel": 5940,
     "light": 890,
     "motion": 370,
     "pixel": 575,
     "process": 265,
     "rendering": 740,
-    "reports": 1791,
+    "reports": 1970,
     "representations": 145,
     "side": 845,
     "sources": 3680,
@@ -45,7 +45,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 340
+FILES = 343
 """Most modules of all packages together."""
 
 _SLACK = 60
