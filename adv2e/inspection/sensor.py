@@ -358,7 +358,7 @@ class _Bench:
         most, at = max(zip(rates, tried, strict=False)), "flicker between 1 and 100 % of white"
         key = "refractory.period_us"
         self._number(
-            "highest rate of a pixel", f"{at}, {most[1]:.3g} Hz", "1/s", *most[:1] * 3, key
+            "highest rate of a pixel", f"{at}, {most[1]:,.0f} Hz", "1/s", *most[:1] * 3, key
         )
         ends = max(least - 1.0, 0.0), least + 1.0
         self._number("least time between events of a pixel", at, "us", least, *ends, key)
@@ -487,7 +487,8 @@ def _moments(contrast: Array, fired: Fired, by_chance: float) -> list[tuple[floa
     span = most - by_chance if most - by_chance > 0.5 else math.nan
     below = (most - fired) / span
     mean = step * below.sum()
-    spread = math.sqrt(max(2.0 * step * (contrast * below).sum() - mean**2, 0.0))
+    square = 2.0 * step * (contrast * below).sum() - mean**2
+    spread = math.sqrt(square) if square > step**2 else 0.0 * span  # less does not show
     drawn = 0.5 * np.diff(fired.astype(np.float64), append=fired[-1]) ** 2
     ends = [math.sqrt(p * (1 - p) / n) for p, n in ((most, last.size), (by_chance, fired.size))]
     error = math.hypot(step * drawn.sum() ** 0.5, (contrast[-1] - mean) * ends[0], mean * ends[1])

@@ -169,15 +169,16 @@ def _chart(plot: Found, drawn: Sequence[tuple[Found, str]]) -> Markup:
     top = 14 + len(y_label) * LINE_HEIGHT
     bottom = top + PLOT_HEIGHT
     rows = [{key: _floats(one[key]) for key in ("x", "y", "low", "high")} for one, _ in drawn]
+    marked = drawable(np.array([plot["mark"][0]] if plot["mark"] else []))
     ups = [row[key] for row in rows for key in ("y", "low", "high")]
     across = axis_over(
         [row["x"] for row in rows], LEFT, WIDTH - RIGHT, log="x" in plot["log"], tight=True
     )
-    up = axis_over(ups, bottom, top, log="y" in plot["log"])
+    up = axis_over([*ups, marked], bottom, top, log="y" in plot["log"])
     if across is None or up is None:
         return tag("p", "There is nothing to draw: no value is known.", class_="note")
     content = [tag("title", plot["title"]), draw_axes(across, up, x_label, y_label)]
-    if plot["mark"] is not None and up.low < plot["mark"][0] < up.high:
+    if plot["mark"]:
         y = up.at(plot["mark"][0])
         content.append(rule(LEFT, y, WIDTH - RIGHT, y, "mark"))
         content.append(place_text(WIDTH - RIGHT, y - 4, plot["mark"][1], text_anchor="end"))
