@@ -513,8 +513,7 @@ class SensorOptions(TypedDict, total=False):
         float,
         Option(
             help="Size of the step of which the latency is measured: natural logarithm of the ratio"
-            " of the lights.",
-            usual="1, which is 172 %",
+            " of the lights; 1 is 172 %.",
             default=1.0,
             kind="positive",
             metavar="LN",

@@ -37,7 +37,7 @@ LIMITS = {
     "pixel": 575,
     "process": 265,
     "rendering": 740,
-    "reports": 1970,
+    "reports": 1940,
     "representations": 145,
     "side": 845,
     "sources": 3680,

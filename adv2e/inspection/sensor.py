@@ -84,13 +84,14 @@ def sensor(*configs: Written | Sequence[Written], **options: Unpack[SensorOption
     Returns
     -------
     dict
-        Ready for JSON.  ``sensors``: of each its ``name``, resolved ``config``, ``conditions`` in
-        words, ``numbers`` and ``plots``.  A number has ``name``, ``at``, ``unit``, ``value``,
-        ``low`` and ``high`` (95 % interval; without a value, the limit), and the ``keys`` of the
-        configuration that it goes back to.  A plot has ``key``, ``title``, ``x_label`` and
-        ``y_label`` with units, ``log`` (axes that are logarithmic), ``definition``, ``mark`` (a
-        value of y and its name, or None) and ``series``: ``name``, ``x``, ``y``, ``low`` and
-        ``high``, (points,) each.
+        Ready for JSON.  ``options``: those that numbers depend on.  ``sensors``: of each its
+        ``name``, resolved ``config``, ``conditions`` in words, ``numbers`` and ``plots``.
+
+        A number has ``name``, ``at``, ``unit``, ``value``, ``low`` and ``high`` (95 % interval;
+        without a value, the limit), and the ``keys`` of the configuration that it goes back to.  A
+        plot has ``key``, ``title``, ``x_label`` and ``y_label`` with units, ``log`` (axes that are
+        logarithmic), ``definition``, ``mark`` (a value of y and its name, or None) and ``series``:
+        ``name``, ``x``, ``y``, ``low`` and ``high``, (points,) each.
 
     Raises
     ------
@@ -113,7 +114,8 @@ def sensor(*configs: Written | Sequence[Written], **options: Unpack[SensorOption
 def measured(given: Sequence[tuple[str, Config]], **options: Any) -> Found:
     """Return what :func:`sensor` does, of configurations with names."""
     sensors = [_Bench(config, **options).found(name) for name, config in given]
-    return {"adv2e": __version__, **{"options": options}, "sensors": sensors}
+    chosen = {name: value for name, value in options.items() if name != "threads"}
+    return {"adv2e": __version__, "options": chosen, "sensors": sensors}
 
 
 class _Bench:
@@ -387,7 +389,7 @@ class _Bench:
         keys = "arbiter.event_ns", "arbiter.row_ns"
         ends = 0.99 * most, 1.01 * most
         self._number("capacity of the readout", at, "1/s", most, *ends, *keys, section="readout")
-        loads, x_label = np.array(_LOADS), f"load [{most:.3g} events a second]"
+        loads, x_label = np.array(_LOADS), "load: rate of events over the capacity"
         series = [_series("lost", loads, lost), _series("capacity used", loads, sent / most)]
         title = "Readout: loss"
         self._plot(self._readout, "readout_loss", title, x_label, "share", series, "")

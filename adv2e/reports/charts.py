@@ -13,7 +13,7 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from adv2e.rendering.styles import COLOURS
 from adv2e.reports.markup import Markup, Wording, join, tag
@@ -138,7 +138,8 @@ def curve_chart(curve: Curve) -> Markup:
         content.append(tag("path", d=frame.line(measured), class_="curve measured"))
     if dots:
         ys = frame.up.place(measured)
-        content += [_dot(x, y, joined) for x, y in zip(frame.x, ys, strict=True)]
+        r = 2.5 if joined else 3.5
+        content += [dot(x, y, r) for x, y in zip(frame.x, ys, strict=True)]
     for name, band in reversed(models):
         content.append(tag("path", d=frame.line(drawable(band.middle)), class_=f"curve {name}"))
     height = bottom + 26 + len(x_label) * LINE_HEIGHT
@@ -178,11 +179,10 @@ def _frame_of(curve: Curve, top: float, bottom: float) -> Frame | None:
     return Frame(across, up, across.place(x))
 
 
-def _dot(x: float, y: float, joined: bool) -> Markup:
+def dot(x: float, y: float, r: float, kind: str = "measured") -> Markup:
     if not (np.isfinite(x) and np.isfinite(y)):
         return Markup()
-    r = 2.5 if joined else 3.5
-    return tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=r, class_="dot measured")
+    return tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=r, class_=f"dot {kind}")
 
 
 def points_of(x: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -324,7 +324,7 @@ _CHARACTER = 5.9
 """Mean width of a character of the labels."""
 
 
-def drawable(values: Floats) -> Floats:
+def drawable(values: ArrayLike) -> Floats:
     """Return `values` as floats, those that cannot be drawn as NaN."""
     values = np.asarray(values, dtype=np.float64)
     sizes = np.abs(values)

@@ -6,24 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from adv2e.config.tree import flat
 from adv2e.effects import EFFECTS, Effect
-from adv2e.reports.charts import (
-    LEFT,
-    LINE_HEIGHT,
-    PLOT_HEIGHT,
-    RIGHT,
-    WIDTH,
-    Frame,
-    axis_over,
-    draw_axes,
-    drawable,
-    place_text,
-    rule,
-    wrapped,
-)
+from adv2e.reports import charts
+from adv2e.reports.charts import LEFT, LINE_HEIGHT, RIGHT, WIDTH, wrapped
 from adv2e.reports.markup import BUILT_IN, Column, Markup, join, table, tag, unit_of
 from adv2e.reports.page import document
 from adv2e.reports.quantities import interval_text, number_text, value_text
@@ -42,24 +28,14 @@ def sensor_page(found: Found) -> str:
     for k, one in enumerate(sensors):
         for plot in one["plots"]:
             plots.setdefault(plot["key"], [None] * len(sensors))[k] = plot
+    figures = (_figure(some, names) for some in plots.values())
     return document(
         f"Sensor {', '.join(names)}",
         tag("p", "Measured on simulated pixels by adv2e ", found["adv2e"], ".", class_="note"),
         _conditions(sensors),
         tag("section", tag("h2", "Numbers"), _numbers(sensors)),
-        tag(
-            "section",
-            tag("h2", "Curves"),
-            tag("div", *(_figure(some, names) for some in plots.values()), class_="side"),
-        ),
-        *(
-            tag(
-                "section",
-                tag("h2", f"Keys of {one['name']}: declared and measured"),
-                _keys(one),
-            )
-            for one in sensors
-        ),
+        tag("section", tag("h2", "Curves"), tag("div", *figures, class_="side")),
+        *(tag("section", tag("h2", f"Keys of {one['name']}"), _keys(one)) for one in sensors),
     )
 
 
@@ -115,7 +91,7 @@ def _keys(sensor: Found) -> Markup:
     """Return a table of the configuration's keys of pixel and readout beside what was measured."""
     rows = []
     for path, value in flat(sensor["config"]):
-        if value is None or not path.startswith(("pixel.", "readout.")):
+        if value is None or not path.startswith(("pixel.", "readout.", "user.")):
             continue
         effect = next((e.name for e in EFFECTS if f"{path}.".startswith(_sections(e))), "")
         of = (one for one in sensor["numbers"] if path in one["keys"])
@@ -124,13 +100,10 @@ def _keys(sensor: Found) -> Markup:
         meaning = tag("span", BUILT_IN[path].meaning if path in BUILT_IN else "", class_="meaning")
         command = tag("code", f"adv2e effects {effect}") if effect else ""
         declared = f"{value_text(value)} {unit_of(path)}".rstrip()
-        rows.append(
-            [join(path, meaning), declared, tag("div", *measured or "-", class_="long"), command]
-        )
+        cell = tag("div", *measured or "-", class_="long")
+        rows.append([join(path, meaning), declared, cell, command])
     heads = Column("key"), Column("declared", number=True), Column("measured"), Column("more")
-    return table(
-        "keys of the pixel and the readout; effects that are off are left out", heads, rows
-    )
+    return table("of the pixel and the readout; effects that are off are left out", heads, rows)
 
 
 def _sections(effect: Effect) -> tuple[str, ...]:
@@ -152,7 +125,7 @@ def _figure(plots: Sequence[Found | None], names: Sequence[str]) -> Markup:
     if several and len(kinds) > 1:
         entries += [(f"measured dash{n % _HUES}", name) for n, name in enumerate(kinds)]
     items = [
-        tag("li", tag("svg", rule(0, 4, 26, 4, f"curve {hue}"), viewBox="0 0 26 8"), label)
+        tag("li", tag("svg", charts.rule(0, 4, 26, 4, f"curve {hue}"), viewBox="0 0 26 8"), label)
         for hue, label in entries
     ]
     return tag(
@@ -167,36 +140,28 @@ def _figure(plots: Sequence[Found | None], names: Sequence[str]) -> Markup:
 def _chart(plot: Found, drawn: Sequence[tuple[Found, str]]) -> Markup:
     x_label, y_label = wrapped(plot["x_label"], WIDTH - LEFT), wrapped(plot["y_label"], WIDTH)
     top = 14 + len(y_label) * LINE_HEIGHT
-    bottom = top + PLOT_HEIGHT
-    rows = [{key: _floats(one[key]) for key in ("x", "y", "low", "high")} for one, _ in drawn]
-    marked = drawable(np.array([plot["mark"][0]] if plot["mark"] else []))
+    bottom = top + charts.PLOT_HEIGHT
+    keys = ("x", "y", "low", "high")
+    rows = [{key: charts.drawable(one[key] or []) for key in keys} for one, _ in drawn]
+    marked = charts.drawable([plot["mark"][0]] if plot["mark"] else [])
     ups = [row[key] for row in rows for key in ("y", "low", "high")]
-    across = axis_over(
-        [row["x"] for row in rows], LEFT, WIDTH - RIGHT, log="x" in plot["log"], tight=True
-    )
-    up = axis_over([*ups, marked], bottom, top, log="y" in plot["log"])
+    xs, log = [row["x"] for row in rows], "x" in plot["log"]
+    across = charts.axis_over(xs, LEFT, WIDTH - RIGHT, log=log, tight=True)
+    up = charts.axis_over([*ups, marked], bottom, top, log="y" in plot["log"])
     if across is None or up is None:
         return tag("p", "There is nothing to draw: no value is known.", class_="note")
-    content = [tag("title", plot["title"]), draw_axes(across, up, x_label, y_label)]
+    content = [tag("title", plot["title"]), charts.draw_axes(across, up, x_label, y_label)]
     if plot["mark"]:
         y = up.at(plot["mark"][0])
-        content.append(rule(LEFT, y, WIDTH - RIGHT, y, "mark"))
-        content.append(place_text(WIDTH - RIGHT, y - 4, plot["mark"][1], text_anchor="end"))
+        content.append(charts.rule(LEFT, y, WIDTH - RIGHT, y, "mark"))
+        content.append(charts.place_text(WIDTH - RIGHT, y - 4, plot["mark"][1], text_anchor="end"))
     for row, (_, hue) in zip(rows, drawn, strict=True):
-        frame = Frame(across, up, across.place(row["x"]))
+        frame = charts.Frame(across, up, across.place(row["x"]))
         if row["low"].size:
             band = Band(row["y"], row["low"], row["high"])
             content.append(tag("path", d=frame.band(band), class_=f"band {hue}"))
         content.append(tag("path", d=frame.line(row["y"]), class_=f"curve {hue}"))
         ys = up.place(row["y"])
-        content += [
-            tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=2, class_=f"dot {hue}")
-            for x, y in zip(frame.x, ys, strict=True)
-            if np.isfinite(x) and np.isfinite(y)
-        ]
+        content += [charts.dot(x, y, 2, hue) for x, y in zip(frame.x, ys, strict=True)]
     height = bottom + 26 + len(x_label) * LINE_HEIGHT
     return tag("svg", *content, viewBox=f"0 0 {WIDTH} {height}", role="img")
-
-
-def _floats(values: Sequence[float | None] | None) -> Any:
-    return drawable(np.array(values if values is not None else [], dtype=np.float64))
