@@ -14,6 +14,7 @@ export        events -> training sets and voxel grids in a folder
 batch         every sequence below a folder -> the same tree of events
 compare       two recordings -> how far one is from the other
 info          any input -> what it holds
+sensor        configurations -> thresholds, latency, noise and bandwidth that their pixels have
 diagnose      a real recording -> the effect that its simulation lacks
 Recording     events, sensor size and frames: what read_events returns
 EVENT_DTYPE   the record of an event: t [us], x, y, p (1 ON, 0 OFF)
@@ -63,6 +64,7 @@ __all__ = [
     "load_config",
     "read_events",
     "render",
+    "sensor",
     "simulate",
     "view",
     "voxel_grid",
@@ -93,6 +95,7 @@ if TYPE_CHECKING:
     from adv2e.formats.recording import Recording
     from adv2e.formats.writing import write_events
     from adv2e.inspection.inspect import info
+    from adv2e.inspection.sensor import sensor
     from adv2e.rendering.render import render
     from adv2e.rendering.view import view
     from adv2e.representations.voxel_grid import voxel_grid
@@ -118,6 +121,7 @@ _HOMES = {
     "load_config": "adv2e.config",
     "read_events": "adv2e.formats.reading",
     "render": "adv2e.rendering.render",
+    "sensor": "adv2e.inspection.sensor",
     "simulate": "adv2e.conversion.simulation",
     "view": "adv2e.rendering.view",
     "voxel_grid": "adv2e.representations.voxel_grid",

@@ -527,6 +527,31 @@ class CompareOptions(EventInput, total=False):
     threads: Threads
 
 
+class SensorOptions(TypedDict, total=False):
+    """Options of the measures of a sensor."""
+
+    contrast: Annotated[
+        float,
+        Option(
+            help="Size of the step of which the latency is measured: natural logarithm of the ratio"
+            " of the lights; 1 is 172 %.",
+            default=1.0,
+            kind="positive",
+            metavar="LN",
+        ),
+    ]
+    white_lux: Annotated[
+        "float | None",
+        Option(
+            help="Illuminance that white, 255 DN, stands for [lux]; levels of light are then in"
+            " lux, too.",
+            kind="positive",
+            metavar="LUX",
+        ),
+    ]
+    threads: Threads
+
+
 class ConvertOptions(SourceOptions, EventInput, SimulatedOutput, Run, total=False):
     """Options of a conversion."""
 

@@ -18,9 +18,9 @@ import adv2e
 PACKAGE = Path(adv2e.__file__).parent
 
 LIMITS = {
-    "": 1835,
+    "": 1860,
     "batches": 1520,
-    "cli": 1256,
+    "cli": 1320,
     "comparison": 1165,
     "compilation": 285,
     "config": 1315,
@@ -30,14 +30,14 @@ LIMITS = {
     "exporting": 1075,
     "files": 785,
     "formats": 5155,
-    "inspection": 275,
+    "inspection": 645,
     "kernel": 5960,
     "light": 905,
     "motion": 370,
     "pixel": 575,
     "process": 265,
     "rendering": 1036,
-    "reports": 1775,
+    "reports": 1925,
     "representations": 145,
     "side": 870,
     "sources": 3870,
@@ -45,7 +45,7 @@ LIMITS = {
 }
 """Most lines of code of each package; of the modules beside them as ""."""
 
-FILES = 346
+FILES = 349
 """Most modules of all packages together."""
 
 _SLACK = 60

@@ -25,6 +25,7 @@ COMMANDS = {
     "compare": "Measure how much two event streams differ.",
     "export": "Make training sets and representations of events.",
     "diagnose": "Find what a recording holds that its simulation lacks.",
+    "sensor": "Measure what a configured sensor does, on one page.",
     "characterise": "Name the effect that tables of latency or noise ask for.",
     "protocol": "Print what to record with an LED to know a camera.",
     "config": "Show or check a configuration, and explain its keys.",

@@ -11,7 +11,7 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from adv2e.rendering.rate import linear_ticks, tick_labels
 from adv2e.rendering.styles import COLOURS
@@ -19,8 +19,8 @@ from adv2e.reports.markup import Markup, Wording, join, tag
 from adv2e.reports.quantities import estimate_text
 from adv2e.reports.result import ROLES, Band, Curve, ErrorRow, Estimate, Snapshot
 
-WIDTH, _PLOT_HEIGHT = 360, 160
-_LEFT, _RIGHT = 58, 14
+WIDTH, PLOT_HEIGHT = 360, 160
+LEFT, RIGHT = 58, 14
 _FEW_POINTS = 40
 """Up to as many, points of a line are marked."""
 
@@ -29,7 +29,7 @@ _SHOWN = 4
 
 
 @dataclass(frozen=True)
-class _Frame:
+class Frame:
     """The axes and the places of the points across."""
 
     across: Axis
@@ -114,10 +114,10 @@ def curve_chart(curve: Curve) -> Markup:
     Borders of bins are drawn as steps; values at the same place are points without a line.  What
     cannot be drawn (no number, or none that the logarithm has) leaves a gap.
     """
-    x_label = wrapped(curve.x_label, WIDTH - _LEFT)
+    x_label = wrapped(curve.x_label, WIDTH - LEFT)
     y_label = wrapped(curve.y_label, WIDTH)
     top = 14 + len(y_label) * LINE_HEIGHT
-    bottom = top + _PLOT_HEIGHT
+    bottom = top + PLOT_HEIGHT
     frame = _frame_of(curve, top, bottom)
     if frame is None:
         return tag("p", "There is nothing to draw: no value is known.", class_="note")
@@ -137,7 +137,8 @@ def curve_chart(curve: Curve) -> Markup:
         content.append(tag("path", d=frame.line(measured), class_="curve measured"))
     if dots:
         ys = frame.up.place(measured)
-        content += [_dot(x, y, joined) for x, y in zip(frame.x, ys, strict=True)]
+        r = 2.5 if joined else 3.5
+        content += [dot(x, y, r) for x, y in zip(frame.x, ys, strict=True)]
     for name, band in reversed(models):
         content.append(tag("path", d=frame.line(drawable(band.middle)), class_=f"curve {name}"))
     height = bottom + 26 + len(x_label) * LINE_HEIGHT
@@ -158,7 +159,7 @@ def _description(curve: Curve) -> str:
     )
 
 
-def _frame_of(curve: Curve, top: float, bottom: float) -> _Frame | None:
+def _frame_of(curve: Curve, top: float, bottom: float) -> Frame | None:
     x = drawable(curve.x)
     if curve.x_log and len(x) > len(curve.measured) and len(x) > 2 and x[0] <= 0 < x[1]:
         # bins that begin at zero: the first is drawn as wide as the second
@@ -167,21 +168,20 @@ def _frame_of(curve: Curve, top: float, bottom: float) -> _Frame | None:
     for band in (curve.before, curve.after):
         rows += [band.middle, band.low, band.high]
     tight = curve.x_log or len(x) > len(curve.measured)  # points may have room, bins need none
-    across = axis_over([x], _LEFT, WIDTH - _RIGHT, log=curve.x_log, tight=tight)
+    across = axis_over([x], LEFT, WIDTH - RIGHT, log=curve.x_log, tight=tight)
     up = axis_over([drawable(row) for row in rows], bottom, top, log=curve.y_log)
     if across is None or up is None:
         return None
     if curve.x_names:
         middles = 0.5 * (x[1:] + x[:-1])
         across = replace(across, names=list(zip(middles, curve.x_names, strict=True)))
-    return _Frame(across, up, across.place(x))
+    return Frame(across, up, across.place(x))
 
 
-def _dot(x: float, y: float, joined: bool) -> Markup:
+def dot(x: float, y: float, r: float, kind: str = "measured") -> Markup:
     if not (np.isfinite(x) and np.isfinite(y)):
         return Markup()
-    r = 2.5 if joined else 3.5
-    return tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=r, class_="dot measured")
+    return tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=r, class_=f"dot {kind}")
 
 
 def points_of(x: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -297,7 +297,7 @@ _CHARACTER = 5.9
 """Mean width of a character of the labels."""
 
 
-def drawable(values: Floats) -> Floats:
+def drawable(values: ArrayLike) -> Floats:
     """Return `values` as floats, those that cannot be drawn as NaN."""
     values = np.asarray(values, dtype=np.float64)
     sizes = np.abs(values)

@@ -44,18 +44,8 @@ def page(diagnosis: Diagnosis, folder: str | Path = ".") -> str:
         "How large an effect must be to be seen": (residual.detectable(found.detectable), "screen"),
         "Sizes, seeds, times and versions": (findings.facts(found.facts), "paper"),
     }
-    title = f"{found.wording.title} {found.recording}"
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("title", title),
-        tag("style", Markup(STYLE)),
-    )
-    main = tag(
-        "main",
-        tag("h1", title),
+    return document(
+        f"{found.wording.title} {found.recording}",
         tag("p", "Declared model: ", found.declared, class_="note"),
         findings.finding(found),
         findings.main_error(found),
@@ -72,8 +62,21 @@ def page(diagnosis: Diagnosis, folder: str | Path = ".") -> str:
             if content
         ),
     )
-    document = tag("html", head, tag("body", main, tag("script", Markup(_UNFOLD))), lang="en")
-    return f"<!DOCTYPE html>\n{document}\n"
+
+
+def document(title: str, *content: object) -> str:
+    """Return a whole page with a title, and content below it."""
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("title", title),
+        tag("style", Markup(STYLE)),
+    )
+    main = tag("main", tag("h1", title), *content)
+    whole = tag("html", head, tag("body", main, tag("script", Markup(_UNFOLD))), lang="en")
+    return f"<!DOCTYPE html>\n{whole}\n"
 
 
 # ---- The looks of the page: light and dark, on screen and on paper.
@@ -87,13 +90,13 @@ STYLE = """
   color-scheme: light dark;
   --ink: #1a1a1a; --soft: #5a5a5a; --paper: #ffffff; --line: #d9d9d9; --panel: #f5f6f8;
   --before: #c25100; --after: #0072b2; --floor: #6b6b6b;
-  --good: #00694e; --fair: #8a5a00; --poor: #a3231f;
+  --good: #00694e; --fair: #8a5a00; --poor: #a3231f; --fifth: #7d4698;
 }
 @media screen and (prefers-color-scheme: dark) {
   :root {
     --ink: #e8e8e8; --soft: #a8a8a8; --paper: #16181b; --line: #3b3f45; --panel: #202327;
     --before: #f0a13c; --after: #62bdf2; --floor: #a5a5a5;
-    --good: #4fc9a4; --fair: #e6b450; --poor: #ff8a80;
+    --good: #4fc9a4; --fair: #e6b450; --poor: #ff8a80; --fifth: #cfa1e6;
   }
 }
 * { box-sizing: border-box; }
@@ -102,7 +105,7 @@ body {
   font: 15px/1.5 system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif;
 }
 main { max-width: 960px; margin: 0 auto; padding: 20px 20px 48px; }
-h1 { font-size: 1.2rem; margin: 0; overflow-wrap: anywhere; }
+h1 { font-size: 1.2rem; margin: 0; }
 h1 + .note { margin: 0; }
 h2 {
   font-size: 1.2rem; margin: 2.2em 0 0.5em; padding-bottom: 0.2em;
@@ -110,7 +113,7 @@ h2 {
 }
 h3 { font-size: 1rem; margin: 1.4em 0 0.3em; }
 p { margin: 0.5em 0; max-width: 46em; }
-p, li { overflow-wrap: anywhere; }
+p, li, h1, h2, td::before { overflow-wrap: anywhere; }
 td, th { overflow-wrap: break-word; }
 code { font: 0.92em ui-monospace, "SF Mono", Menlo, Consolas, monospace; }
 .note, .meaning { color: var(--soft); font-size: 0.87rem; }
@@ -194,6 +197,17 @@ svg .axis { stroke: var(--soft); stroke-width: 1; }
 .after { --role: var(--after); }
 .floor { --role: var(--floor); }
 .measured { --role: var(--ink); }
+.hue0 { --role: var(--after); }
+.hue1 { --role: var(--before); }
+.hue2 { --role: var(--good); }
+.hue3 { --role: var(--fifth); }
+.hue4 { --role: var(--floor); }
+.dash1 { stroke-dasharray: 7 3; }
+.dash2 { stroke-dasharray: 2 3; }
+.dash3, .dash4 { stroke-dasharray: 9 3 2 3; }
+.value { display: block; }
+.legend svg { display: inline-block; width: 26px; margin-right: 6px; vertical-align: middle; }
+svg .mark { stroke: var(--soft); stroke-width: 1; stroke-dasharray: 2 2; }
 svg .band { fill: var(--role); fill-opacity: 0.2; stroke: none; }
 svg .curve { fill: none; stroke: var(--role); stroke-width: 1.6; stroke-linejoin: round; }
 svg .curve.before { stroke-dasharray: 5 3; }
