@@ -319,7 +319,7 @@ def test_every_place_that_guesses_has_a_case():
 
 
 def test_a_ddd_recording_without_frames(tmp_path):
-    from formats.ddd_files import polarity, write_ddd
+    from ddd_files import polarity, write_ddd
 
     path = write_ddd(tmp_path / "a.hdf5", [polarity([(1, 2, 3, 1), (9, 4, 5, 0)])])
     label, _ = converted(path, tmp_path)

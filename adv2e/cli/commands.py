@@ -10,7 +10,7 @@ _GROUPS = {
     "Input": (
         *("fps", "timestamps", "time_unit", "track", "start", "stop", "start_s", "stop_s", "crop"),
         *("rotate180", "bayer", "pixel_format", "network", "allow_damaged", "take"),
-        *("set_back", "crop_events", "side"),
+        *("set_back", "crop_events", "side", "strict"),
         "light",
     ),
     "Sensor and pixel": (

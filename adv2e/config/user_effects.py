@@ -85,7 +85,10 @@ def user_effects(config: Config) -> Mapping[str, type[Hooks]]:
 # ---- Effects of the user's own: classes loaded from a file.
 
 
-METHODS = ("light", "gain", "drive", "signal", "thresholds", "inject", "events")
+METHODS = (
+    *("light", "light_now", "gain", "drive", "signal", "thresholds", "inject"),
+    *("events", "events_now"),
+)
 """The methods of which an effect overrides one at least."""
 
 

@@ -83,7 +83,7 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
             "p.gif",
             "--allow-damaged",
         ),
-        *("--causes", "--motion", "pan", "--extent", "9", "--stream", "1"),
+        *("--causes", "--motion", "pan", "--extent", "9", "--stream", "1", "--strict"),
     )
     assert outcome.status == 0
     ((reading, output, options),) = pipeline.calls
@@ -121,6 +121,8 @@ def test_convert_passes_its_options_on(adv2e, pipeline):
         "progress": True,
         "also_read": [find("ideal")],
         "doubt": None,
+        "source_sha256": None,
+        "strict": True,
     }
     assert log.level == 0
 
