@@ -79,6 +79,12 @@ def test_classes_of_a_file_in_their_order(load):
     assert effects[0].source["file"] == "mine.py"
 
 
+@pytest.mark.parametrize("method", ["light_now(self, t_ns, light)", "events_now(self, events)"])
+def test_what_a_loop_calls_makes_an_effect(load, method):
+    (effect,) = load(f"class A(Hooks):\n    def {method}: return None")
+    assert effect.name == "a"
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
