@@ -372,7 +372,9 @@ class Pixels:
             config.pixel, config.sampling, config.seed, light, t_ns, hooks=hooks, **options
         )
         threads = self.array.threads
-        self.intervals = Intervals(t_ns, first, config.sampling, threads=threads, given=given)
+        self.intervals = Intervals(
+            t_ns, first, config.sampling, threads=threads, given=given, whole=self.array.merges
+        )
         self.order = InOrder()
         self._hooks, self._table = hooks, table
 

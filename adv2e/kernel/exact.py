@@ -183,7 +183,8 @@ def _strip(lo, count, schedule, circuit, rules, plan, state, memory, buffer, n):
     settled, resting = cascade_screen.is_settled(strip), False
     f = np.int64(0)
     while f < intervals:
-        still = _rests(schedule, f, lo, count)
+        same = _rests(schedule, f, lo, count)
+        still = same
         if not still:
             load(frames, before[f + 1], share[f + 1], lo, floor, light)
             still = screen.is_still(strip)
@@ -204,7 +205,10 @@ def _strip(lo, count, schedule, circuit, rules, plan, state, memory, buffer, n):
         if resting and has_leak:
             static_pixels.end_rest(lo, count, circuit, state, strip)
         resting = False
-        interval = Interval(f, start, starts[f], starts[f + 1] - starts[f])
+        until = f + 1
+        if plan is not None:
+            until = plan.until[f] if same and settled else until
+        interval = Interval(f, start, starts[f], starts[until] - starts[f])
         # of an argument that is None the compiler knows it, and compiles one of the two
         if plan is None:
             if rules is not None:
@@ -213,13 +217,12 @@ def _strip(lo, count, schedule, circuit, rules, plan, state, memory, buffer, n):
                     lo, count, interval, circuit, rule, state, own, buffer, n
                 )
         else:
-            n, buffer = cascade.advance(
-                lo, count, interval, number, still and settled, circuit, plan, state, memory,
-                buffer, n,
+            n, buffer, number = cascade.advance(
+                lo, count, interval, until, number, still and settled, circuit, plan, state,
+                memory, buffer, n,
             )  # fmt: skip
-            number += plan.pieces[plan.cut[f]]
         settled = still and (settled or cascade_screen.is_settled(strip))
-        f += 1
+        f = until
     _close_strip(lo, count, number, circuit, state, strip, memory.cascade.noise)
     return n, buffer
 

@@ -62,6 +62,17 @@ class Part:
     times_ns: list[int]
     last: NDArray[np.bool_]
 
+    @property
+    def until(self) -> NDArray[np.int64]:
+        """Number of the next frame's instant, of instants of a frame; of others, of the next one.
+
+        (intervals,); where nothing moves from frame to frame, nothing does in between.
+        """
+        at_frame = self.share[: len(self.times_ns)] == 1.0
+        frames, following = np.flatnonzero(at_frame), np.arange(1, at_frame.size)
+        following[frames[:-1]] = frames[1:]
+        return following
+
 
 @dataclass(frozen=True)
 class _Instant:
@@ -84,6 +95,8 @@ class Intervals:
         For interpolations that take their time.
     given : callable, optional
         Flow; see :func:`adv2e.light.interpolation.make_upsampler`.
+    whole : bool
+        Parts end with frames of the input, whatever lies between these.
     """
 
     def __init__(
@@ -94,8 +107,9 @@ class Intervals:
         *,
         threads: int,
         given: GivenFlow | None = None,
+        whole: bool = False,
     ) -> None:
-        self._L = sampling.L
+        self._L, self._whole = sampling.L, whole
         self._printed = sampling.last_interval == "printed"
         # without frames in between, there is nothing to interpolate
         linear = sampling.interpolation == "linear" or sampling.L == 1
@@ -133,9 +147,11 @@ class Intervals:
             self._instants.append(instant)
             # the times of a part must not grow out of a packed event either
             long = instant.t_ns - self._instants[0].t_ns > LONGEST_S * 10**9
-            if len(self._instants) > (1 if long else self._size) + ahead:
-                yield self._part(len(self._instants) - 1 - ahead)
-                self._drop(len(self._instants) - 1 - ahead)
+            count = len(self._instants) - 1 - ahead
+            is_end = not self._whole or self._instants[count].ends
+            if count >= (1 if long else self._size) and is_end:
+                yield self._part(count)
+                self._drop(count)
         if ends and self._number == 0:
             raise DataError("a single frame: at least two are needed")
         left = len(self._instants) - 1 - (0 if ends else ahead)

@@ -122,6 +122,7 @@ class PixelArray:
         self._start = start = self._relative(t_ns)
         name = driver_of(pixel, self.circuit, inside, method)
         self._advance, new_memory = _SOLVERS[name]
+        self.merges = name == "run_exact" and self.circuit.noise_rms > 0.0
         self._stepping = None if name == "run_exact" else Stepping(
             self.circuit, self.pixels, self.columns, inside, self._drift_per_s, self.origin_us,
             start, coarseness,
@@ -198,9 +199,10 @@ class PixelArray:
         simple = max(abs(circuit.overshoot), abs(self._drift_per_s), circuit.noise_rms) == 0.0
         if circuit.follower == 0.0 and simple:
             return [(rules_for(lengths, fastest, circuit.dead_time), None)]
-        noise = noise_of(circuit, self._level, LONGEST_US) if circuit.noise_rms > 0.0 else None
+        noise = noise_of(circuit, self._level, LONGEST_US) if self.merges else None
         factors = drift_factors((starts - self._start) * 1e-6, self._drift_per_s)
-        plan = plan_for(lengths, fastest, circuit.follower, factors, simple, noise)
+        until = part.until if self.merges else np.arange(1, starts.size)
+        plan = plan_for(starts, until, fastest, circuit.follower, factors, simple, noise)
         return [(None, plan)]
 
     def _by_tiles(

@@ -9,8 +9,10 @@ from reference.agreement import count_and_time_errors
 from reference.differences import STEP_S, Truth
 from scipy import interpolate, linalg
 
+from adv2e import Config, simulate
 from adv2e.causes import LEAK, PHOTORECEPTOR_NOISE
 from adv2e.config.model import (
+    Frames,
     Leak,
     PhotoreceptorNoise,
     Pixel,
@@ -26,6 +28,7 @@ from adv2e.kernel.cascade.plan import plan_for
 from adv2e.kernel.photoreceptor import law
 from adv2e.kernel.photoreceptor.strip import BLOCKS
 from adv2e.kernel.quadrature import rounded
+from adv2e.kernel.work_queue import STRIP
 from adv2e.pixel.state import make_circuit
 
 RAD_US = 2 * math.pi * 1e-6
@@ -198,7 +201,9 @@ def drawn_path(pixel, light, interval_us, intervals, i, seed):
     level = min(pixel.thresholds.on, pixel.thresholds.off)
     noise = law.noise_of(circuit, level, LONGEST_US)
     lengths = np.full(intervals, interval_us)
-    plan = plan_for(lengths, fastest, circuit.follower, np.ones(intervals + 1), False, noise)
+    starts = np.concatenate([[0.0], np.cumsum(lengths)])
+    until, factors = np.arange(1, starts.size), np.ones(starts.size)
+    plan = plan_for(starts, until, fastest, circuit.follower, factors, False, noise)
     w = circuit.dark + circuit.per_dn * light
     entry = (int(np.float32(w).view(np.int32)) >> law.SHIFT) - plan.laws.lowest
     w = float(np.int32(((entry + plan.laws.lowest) << law.SHIFT) + 32768).view(np.float32))
@@ -280,6 +285,33 @@ def test_events_are_those_of_the_path_of_which_everything_is_drawn(follower_hz, 
     assert found.count_b > 5
     assert not found.differing
     assert found.max_dt_us < 1.5
+
+
+@pytest.mark.parametrize("follower_hz", [None, 100.0])
+def test_what_rests_is_drawn_from_frame_to_frame_whatever_lies_between(follower_hz):
+    """Whole pieces of time have the noise of whole pieces, also beside what moves."""
+    pixel = quiet(
+        photoreceptor_noise=PhotoreceptorNoise(rms=0.12),
+        source_follower=SourceFollower(cutoff_hz=follower_hz) if follower_hz else None,
+    )
+    frames = [np.full((96, 64), 80.0, np.float32) for _ in range(30)]
+    moving = [frame.copy() for frame in frames]
+    for number, frame in enumerate(moving):
+        frame[:4] += 30.0 * (number % 3)  # all of its strip, and no other
+
+    def made(images, L):
+        config = Config(
+            seed=3, pixel=pixel, sampling=Sampling(L=L), frames=Frames(encoding="linear")
+        )
+        chunks = simulate([image / 255 for image in images], fps=240, config=config)
+        return np.concatenate(list(chunks))
+
+    alone = made(frames, 1)
+    assert alone.size > 1000
+    assert np.array_equal(alone, made(frames, 10))
+    beside, below = made(moving, 10), STRIP // 64
+    assert np.array_equal(beside[beside["y"] >= below], alone[alone["y"] >= below])
+    assert not np.array_equal(beside, alone)
 
 
 def without(*names, **more):

@@ -98,16 +98,18 @@ def _solve_beside_noise(lo, number, which, piece, circuit, laws, state, memory, 
 
 
 @inlined
-def advance(lo, count, interval, number, still, circuit, plan, state, memory, buffer, n):
+def advance(lo, count, interval, until, number, still, circuit, plan, state, memory, buffer, n):
     """Advance one strip over an interval, piece by piece; `still`: nothing moves or lags in it.
 
+    until : number of its end
     number : of its first piece, of all in the recording
     """
     (plan,) = borrowed(plan)
     strip, own, laws, f = memory.strip.rows, memory.cascade, plan.laws, interval.f
-    cut, noise, has_leak, is_noisy = plan.cut[f], own.noise, leaks(circuit), circuit.noise_rms > 0.0
+    noise, has_leak, is_noisy = own.noise, leaks(circuit), circuit.noise_rms > 0.0
+    cut = plan.cut_still[f] if until > f + 1 else plan.cut[f]
     pieces = plan.pieces[cut]
-    first, rise = plan.factors[f], plan.factors[f + 1] - plan.factors[f]
+    first, rise = plan.factors[f], plan.factors[until] - plan.factors[f]
     if pieces > 1 and not still:
         _begin_pieces(strip, circuit, own)
     for p in range(pieces):
@@ -151,7 +153,7 @@ def advance(lo, count, interval, number, still, circuit, plan, state, memory, bu
         if has_leak:
             lower_references(lo, 0, count, state, memory.strip)
         cascade.step_on(strip, substeps, still)
-    return n, buffer
+    return n, buffer, number + pieces
 
 
 def parts(circuit, plan, state, memory, buffer):

@@ -8,6 +8,7 @@ share of the time since, however fast white is.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -49,6 +50,8 @@ class Plan(NamedTuple):
     """Pieces of each interval, and their substeps, at most MOST a piece."""
 
     cut: NDArray[np.int64]  # (intervals,): which of the ways that follow
+    until: NDArray[np.int64]  # (intervals,): end of what is one piece of time where nothing moves,
+    cut_still: NDArray[np.int64]  # and which way is that of it
     pieces: NDArray[np.int64]  # (ways,)
     substeps: NDArray[np.int64]  # (ways, pieces)
     ends: _Array  # (ways, pieces + 1): of pieces, as shares of the interval
@@ -61,7 +64,8 @@ class Plan(NamedTuple):
 
 
 def plan_for(
-    lengths: _Array,
+    starts: _Array,
+    until: NDArray[np.int64],
     fastest: float,
     follower: float,
     factors: _Array,
@@ -72,8 +76,10 @@ def plan_for(
 
     Parameters
     ----------
-    lengths : (intervals,)
-        Lengths of the intervals [us].
+    starts : (intervals + 1,)
+        Ends of the intervals [us].
+    until : (intervals,)
+        Number of the end up to which time is not cut where nothing moves from this interval on.
     fastest : float
         Corner of the first pole at white [rad/us].
     follower : float
@@ -85,8 +91,10 @@ def plan_for(
     noise : NoiseTerms, optional
         Photoreceptor noise.
     """
+    lengths = np.concatenate([np.diff(starts), starts[until] - starts[:-1]])
     distinct, cut = np.unique(lengths, return_inverse=True)
-    ways = [_pieces(length, fastest, noise) for length in distinct.tolist()]
+    # of ns: lengths that differ by rounding have the same pieces
+    ways = [_pieces(round(length, 3), fastest, noise) for length in distinct.tolist()]
     count = max((len(way) for way in ways), default=1)
     shape = len(ways), count
     substeps, law = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
@@ -106,11 +114,13 @@ def plan_for(
         roughly = np.array([rounded(length) for length in lasting[is_piece].tolist()])
         tabled, law[is_piece] = np.unique(roughly, return_inverse=True)
         laws = laws_for(tabled, noise)
+    alone, still = cut.astype(np.int64).reshape(2, -1)
     return Plan(
-        cut.astype(np.int64), pieces, substeps, ends, places, weights, factors, simple, laws, law
+        alone, until, still, pieces, substeps, ends, places, weights, factors, simple, laws, law
     )
 
 
+@lru_cache(maxsize=256)
 def _pieces(length: float, fastest: float, noise: NoiseTerms | None) -> list[_Array]:
     """Return the places of the ends of substeps, piece by piece, in an interval of `length` us."""
     upto = 1.001 * length * fastest
