@@ -51,7 +51,7 @@ def parse_size(given: str | tuple[int, ...]) -> Size:
     >>> parse_size("346x260")
     Size(width=346, height=260)
     """
-    text = given if isinstance(given, str) else "x".join(map(str, given))
+    text = "x".join(map(str, given)) if isinstance(given, (tuple, list)) else str(given)
     found = _SIZE.fullmatch(text.replace(" ", ""))
     size = Size(*map(int, found.groups())) if found else Size(0, 0)
     if min(size) < 1:

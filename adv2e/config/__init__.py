@@ -14,8 +14,9 @@ from adv2e.config.model import Config
 from adv2e.config.tree import form_text, merge, parse_set
 from adv2e.config.user_effects import config_class, user_effects
 from adv2e.config.yaml12 import Origin, Value, key_text
-from adv2e.errors import ConfigError
+from adv2e.errors import ConfigError, UsageError
 from adv2e.files.regular import shown
+from adv2e.geometry import parse_size
 
 if TYPE_CHECKING:
     from adv2e.effects.hooks import Hooks
@@ -65,7 +66,7 @@ def load_config(
     effects : sequence of classes, optional
         Effects of your own (:class:`adv2e.effects.hooks.Hooks`); each is on, and has a section
         ``user.<name>``.  Those of a configuration among `files` come before them.
-    size : (int, int), optional
+    size : (int, int), or str as "346x260", optional
         Width and height of the sensor.
 
     Raises
@@ -73,7 +74,7 @@ def load_config(
     ConfigError
         A file is missing or wrong; the text names file, line, key and what would be right.
     UsageError
-        One of `sets` is wrong.
+        One of `sets` is wrong, or `size` is none.
 
     Examples
     --------
@@ -218,7 +219,10 @@ def _merged(
     if seed is not None:
         over.append(_tree({"seed": seed}, Origin("--seed", on_command_line=True)))
     if size is not None:
-        sensor = dict(zip(("width", "height"), size, strict=True))
+        try:
+            sensor = parse_size(size)._asdict()
+        except ValueError as error:
+            raise UsageError(f"size: {error}") from None
         over.append(_tree({"sensor": sensor}, Origin("--size", on_command_line=True)))
     return reduce(merge, [*map(_layer, files), *over], Value({}))
 

@@ -352,3 +352,10 @@ def test_numbers_of_thousands_of_digits(tmp_path):
     (tmp_path / "long.yaml").write_text(f"seed: {'9' * 5000}\n")
     with pytest.raises(ConfigError, match=r"long\.yaml:1: seed: '9{40}' is not a value of !!int"):
         load_config([tmp_path / "long.yaml"])
+
+
+@pytest.mark.parametrize("size", ["64by48", "x", 5, (64,), (0, 3), (1.5, 2)])
+def test_a_size_that_is_none_is_one_line(size):
+    with pytest.raises(UsageError, match=r"^size: must be columns x rows, such as 346x260, got"):
+        load_config(size=size)
+    assert load_config(size="64x48") == load_config(size=(64, 48))
