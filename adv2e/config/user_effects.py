@@ -24,7 +24,7 @@ from adv2e.config.model import Config
 from adv2e.effects import STAGES
 from adv2e.effects.hooks import Hooks
 from adv2e.errors import ConfigError, one_line
-from adv2e.files.regular import read_text_bytes, shown
+from adv2e.files.regular import read_text_bytes, reading, shown
 from adv2e.parameters import Section, subsection
 
 if TYPE_CHECKING:
@@ -99,10 +99,8 @@ def load_effects(path: str | Path) -> list[type[Hooks]]:
         the text names the file and, where there is one, the line.
     """
     path = Path(path)
-    try:
+    with reading(path, ConfigError):
         source = read_text_bytes(path, ConfigError)
-    except OSError as error:
-        raise ConfigError(f"{path}: {error.strerror or error}") from None
     digest = hashlib.sha256(source).hexdigest()
     module = _run(path, source, f"adv2e_effect_{digest[:16]}")
     found = [

@@ -37,7 +37,6 @@ from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,8 +52,9 @@ from adv2e.formats.text import lines_of
 from adv2e.formats.text_writer import blocks_of, formatted, text_blocks
 from adv2e.formats.writing import Request, Writer, listed_side, to_json, write_side
 from adv2e.label import told_of
-from adv2e.sources.frame import Frame, Shot
-from adv2e.sources.images.opencv import decode_image
+from adv2e.light.pictures import png_of
+from adv2e.sources.frame import Shot
+from adv2e.sources.images.opencv import image_of
 from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST
 from adv2e.sources.times.lists import FrameList, decoded, has_lines, members_of, parse_list
 from adv2e.sources.times.rates import nine_decimals
@@ -93,7 +93,7 @@ def open_davis240c(path: Path, facts: Facts) -> EventFile:
         facts.note_frames(listed.unit, whole=listed.whole)
     if facts.geometry is None and listed is not None:
         first = members_of(listed.stamps[:1], files.label(LIST), files.has)[0]
-        rows, columns = decode_image(files.read(first), files.label(first)).image.shape[:2]
+        rows, columns = image_of(files, first).image.shape[:2]
         facts.state((columns, rows), first)
     label = files.label(name)
     header = f"the first line of {name}"
@@ -105,14 +105,10 @@ def open_davis240c(path: Path, facts: Facts) -> EventFile:
     facts.problems += [told_of(LIST, line) for line in (listed.unit.doubt, listed.order) if line]
     names = members_of(listed.stamps, files.label(LIST), files.has)
     shots = [
-        Shot(stamp.t_ns, files.label(member), partial(_image, files, member))
+        Shot(stamp.t_ns, files.label(member), partial(image_of, files, member))
         for stamp, member in zip(listed.stamps, names, strict=True)
     ]
     return replace(text_file, layout="davis240c", shots=lambda: iter(shots))
-
-
-def _image(files: Members, name: str) -> Frame:
-    return decode_image(files.read(name), files.label(name))
 
 
 def _listed(files: Members, **evidence: Any) -> FrameList | None:
@@ -125,12 +121,6 @@ def _listed(files: Members, **evidence: Any) -> FrameList | None:
 
 _BLOCK = 1 << 20  # bytes of text deflated at once: the archive must not depend on who calls how
 _LEVEL = 4  # of deflate: a fifth more bytes than level 6, in a third of its time
-
-
-def _png(image: NDArray[Any]) -> bytes:
-    done, data = cv2.imencode(".png", image)
-    assert done
-    return data.tobytes()
 
 
 class _Davis240cWriter(Writer):
@@ -146,8 +136,7 @@ class _Davis240cWriter(Writer):
         """Append a frame."""
         name = f"images/frame_{len(self._lines):08d}.png"
         self._lines.append(f"{nine_decimals(t_ns)} {name}\n")
-        ordered = image[..., ::-1] if image.ndim == 3 else image  # the colours of OpenCV
-        self._store_frame(name, t_ns, np.array(ordered))
+        self._store_frame(name, t_ns, image.copy())
 
     @abstractmethod
     def _store_frame(self, name: str, t_ns: int, image: NDArray[Any]) -> None:
@@ -176,7 +165,7 @@ class FolderWriter(_Davis240cWriter):
             self._work.submit(formatted, block, take=self._events.write)
 
     def _store_frame(self, name: str, t_ns: int, image: NDArray[Any]) -> None:
-        self._work.submit(_png, image, take=(self._folder / name).write_bytes)
+        self._work.submit(png_of, image, take=(self._folder / name).write_bytes)
 
     def finish(self) -> None:
         """Write the remaining frames, the list and the description."""
@@ -231,7 +220,7 @@ class ZipWriter(_Davis240cWriter):
         def take(data: bytes) -> None:
             self._encoded.append(t_ns, np.frombuffer(data, np.uint8))
 
-        self._work.submit(_png, image, take=take)
+        self._work.submit(png_of, image, take=take)
 
     def finish(self) -> None:
         """Write the remaining events, the list, the frames and the description."""

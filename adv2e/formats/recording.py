@@ -140,14 +140,13 @@ class Recording:
         from base64 import b64encode  # noqa: PLC0415 - all these are for notebooks alone
         from html import escape  # noqa: PLC0415
 
-        import cv2  # noqa: PLC0415
-
         from adv2e import render  # noqa: PLC0415 - which is above this module
+        from adv2e.light.pictures import png_of  # noqa: PLC0415
 
         parts = [f"<p>{escape(repr(self))}</p>"]
         for style in ("white", "rate") if self.events.size and self.width and self.height else ():
             picture: Any = render(self, count=1, frames=False, style=style)
-            data = b64encode(cv2.imencode(".png", picture[:, :, ::-1])[1].tobytes()).decode()
+            data = b64encode(png_of(picture)).decode()
             words = "events" if style == "white" else "rate of events over time"
             parts.append(f'<img alt="{words}" src="data:image/png;base64,{data}"/>')
         return "<br>".join(parts)

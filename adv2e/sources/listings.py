@@ -31,8 +31,8 @@ from adv2e.errors import DataError
 from adv2e.files.zips import Members
 from adv2e.label import guessed, told_of
 from adv2e.sources.base import GivenTimes, Selection
-from adv2e.sources.frame import Frame, Light
-from adv2e.sources.images.opencv import IMAGE_SUFFIXES, decode_image
+from adv2e.sources.frame import Light
+from adv2e.sources.images.opencv import IMAGE_SUFFIXES, image_of
 from adv2e.sources.listed import ListedSource, Picture, timed
 from adv2e.sources.times.lists import decoded, first_name, member_of, members_of, parse_list
 
@@ -129,7 +129,7 @@ def listed_source(
     where = f" in {path}" if path.is_dir() else " in the zip"
     members = members_of(found.stamps, label, partial(_has, files, folder), where=where)
     places = [str(folder / member) for member in members]
-    pictures = [Picture(files.label(m), m, partial(_read_image, files, m)) for m in places]
+    pictures = [Picture(files.label(m), m, partial(image_of, files, m)) for m in places]
     # in their order: which picture a name means is settled
     unnamed = replace(found, stamps=[replace(stamp, name=None) for stamp in found.stamps])
     times = timed(given, pictures, path, label, lambda _: unnamed)
@@ -151,7 +151,3 @@ def _folder(files: Members, listing: Listing, name: str) -> PurePosixPath:
 
 def _has(files: Members, folder: PurePosixPath, member: str) -> bool:
     return files.has(str(folder / member))
-
-
-def _read_image(files: Members, member: str) -> Frame:
-    return decode_image(files.read(member), files.label(member))

@@ -20,6 +20,7 @@ import re
 import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import takewhile
 
 from adv2e.effects.frames.encoding import UNKNOWN
 from adv2e.errors import DataError
@@ -122,7 +123,8 @@ def check_size(width: int, height: int, data: bytes, label: str) -> None:
 def _png(data: bytes) -> Header:
     width, height, depth, colours = struct.unpack_from(">IIBB", data, 16)
     pictures, clear, densities, light = 1, None, (1, 1), {}
-    for kind, content in _png_chunks(data):
+    # those before the picture's data: all that say how it is to be read
+    for kind, content in takewhile(lambda chunk: chunk[0] != b"IDAT", png_chunks(data)):
         if kind == b"pHYs":
             densities = struct.unpack_from(">II", content)
         elif kind in _LIGHT:
@@ -166,15 +168,12 @@ def _light_of_png(chunks: dict[bytes, bytes]) -> tuple[str, str]:
     return "", ""
 
 
-def _png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Yield the chunks before the picture's data: all that say how it is to be read."""
+def png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Yield kind and content of the chunks of a PNG."""
     at = 8
     while at + 12 <= len(data):
         (size,) = struct.unpack_from(">I", data, at)
-        kind = data[at + 4 : at + 8]
-        if kind == b"IDAT":
-            return
-        yield kind, data[at + 8 : at + 8 + size]
+        yield data[at + 4 : at + 8], data[at + 8 : at + 8 + size]
         at += 12 + size
 
 

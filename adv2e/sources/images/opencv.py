@@ -19,6 +19,8 @@ import numpy as np
 
 from adv2e.effects.frames.encoding import full_scale_of, is_light
 from adv2e.errors import DataError, MissingExtraError
+from adv2e.files.regular import reading
+from adv2e.files.zips import Members
 from adv2e.process.standard_error import overhearing
 from adv2e.sources.frame import Frame, Image, check_pixels
 from adv2e.sources.images import headers
@@ -73,11 +75,14 @@ def rgb_of(image: Any) -> Image:
 
 def read_image(path: Path) -> Frame:
     """Return the image in a file, all its bits kept; DataError if it cannot be read."""
-    try:
+    with reading(path):
         data = path.read_bytes()
-    except OSError as error:
-        raise DataError(f"{path}: {error.strerror}") from error
     return decode_image(data, str(path))
+
+
+def image_of(files: Members, name: str) -> Frame:
+    """Return an image of a folder or zip; DataError if it cannot be read."""
+    return decode_image(files.read(name), files.label(name))
 
 
 def decode_image(data: bytes, label: str) -> Frame:

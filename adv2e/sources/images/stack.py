@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import IO
 
 from adv2e.errors import DataError
+from adv2e.files.regular import reading
 from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.frame import Frame
 from adv2e.sources.images.headers import is_tiff
@@ -239,10 +240,8 @@ class Pages:
         return data
 
     def _opened(self) -> IO[bytes]:
-        try:
+        with reading(self._path):
             return self._path.open("rb")
-        except OSError as error:
-            raise self._error(error.strerror or str(error)) from error
 
     def _error(self, what: str) -> DataError:
         return DataError(f"{self._path}: {what}")

@@ -19,7 +19,7 @@ from typing import Any
 from unicodedata import normalize
 
 from adv2e.errors import DataError
-from adv2e.files.regular import read_text_bytes
+from adv2e.files.regular import read_text_bytes, reading
 from adv2e.label import told_of
 from adv2e.sources.times.rates import NUMBER, Stamp, Unit, frame_unit, parse_ns, seconds
 
@@ -418,10 +418,8 @@ def _paired(text: str, path: Path, ends: Path) -> tuple[str, str]:
 
 
 def _text(path: Path) -> str:
-    try:
+    with reading(path):
         return decoded(read_text_bytes(path), str(path))
-    except OSError as error:
-        raise DataError(f"{path}: {error.strerror}") from error
 
 
 def decoded(data: bytes, label: str) -> str:

@@ -22,6 +22,7 @@ import av.logging
 from av.stream import Disposition
 
 from adv2e.errors import DataError
+from adv2e.files.regular import reading
 from adv2e.sources.frame import Track, choose
 
 FORMATS = (
@@ -82,10 +83,8 @@ def opened(path: str, track: str | None = None) -> Iterator[Video]:
     DataError
         It is no video, damaged beyond reading, or has no such track.
     """
-    try:
+    with reading(path):
         file = io.FileIO(path)
-    except OSError as error:
-        raise DataError(f"{path}: {error.strerror}") from error
     with file:
         size = os.fstat(file.fileno()).st_size
         if not size:
