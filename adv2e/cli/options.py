@@ -262,7 +262,7 @@ def declared_options(*groups: Any, help: Mapping[str, str] | None = None) -> Cal
 
 
 def _click_option(name: str, option: Option, help: str = "") -> Callable[[Body], Body]:
-    about: dict[str, Any] = {"default": option.default, "metavar": option.metavar or None}
+    about: dict[str, Any] = {"default": option.default, "metavar": option.shown}
     text = f"{option.help} {help}".rstrip()
     if option.default == ():
         about["multiple"], text = True, f"{text} Repeatable."
