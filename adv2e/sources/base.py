@@ -40,6 +40,7 @@ from adv2e.sources.frame import (
     rotated180,
 )
 from adv2e.sources.paths import SensorPath
+from adv2e.sources.times.lists import read_list
 from adv2e.sources.times.rates import NS_PER_S, FrameRate, Rate, parse_rate, seconds
 from adv2e.ticks import check_time
 
@@ -170,6 +171,27 @@ class Source(ABC):
     def listed(self) -> Sequence[Shot]:
         """Return all frames, in the order of time, where they are known before; else none."""
         return ()
+
+    def _take_list(self, given: GivenTimes, own_step_s: float | None = None) -> list[int]:
+        """Return the times [ns] of the list that is given, of which doubts and notes are taken.
+
+        Raises
+        ------
+        DataError
+            It cannot be read, or has exposures: sources that are no pictures do not take these.
+        """
+        assert given.timestamps is not None
+        label, unit = str(given.timestamps), given.time_unit
+        found = read_list(given.timestamps, time_unit=unit, own_step_s=own_step_s)
+        if any(stamp.exposure_ns for stamp in found.stamps):
+            raise DataError(
+                f"{label}: exposures, with start and end, are for pictures and stacks: make a"
+                " folder of pictures of these frames, or a list of their middles"
+            )
+        doubts, notes = found.told(label)
+        self.doubts += doubts
+        self.notes += notes
+        return [stamp.t_ns for stamp in found.stamps]
 
     def own_times_ns(self) -> list[int] | None:
         """Return the times of the frames that a rate replaces [ns]; None: there are none.

@@ -65,7 +65,9 @@ class Header:
     grey : bool
         OpenCV repeats grey three times.
     white : float, optional
-        Number that means white, where it is not that of the data type.
+        Number that means white in the image of OpenCV, where it is not that of the data type.
+    inverted : bool
+        Zero is white in the image of OpenCV.
     clear : int, optional
         Grey value of pixels that are not there, in the bits that OpenCV returns.
     encoding, says : str
@@ -80,6 +82,7 @@ class Header:
     alpha: Alpha = Alpha.STRAIGHT
     grey: bool = False
     white: float | None = None
+    inverted: bool = False
     clear: int | None = None
     encoding: str = ""
     says: str = ""
@@ -257,34 +260,14 @@ class _Tag:
     """Offset of its values in the file [bytes]."""
 
 
-@dataclass(frozen=True)
-class Tiff:
-    """Facts about a TIFF beside its pixels: white, inversion, alpha.
-
-    Attributes
-    ----------
-    data : bytes
-        The file, so that OpenCV leaves colours as they are.
-    white : float, optional
-        Number that means white in the image of OpenCV, where it is not that of the data type.
-    inverted : bool
-        Zero is white in the image of OpenCV.
-    alpha : Alpha
-        Meaning of a fourth channel.
-    """
-
-    data: bytes
-    white: float | None
-    inverted: bool
-    alpha: Alpha
-
-
 def is_tiff(data: bytes) -> bool:
     return data[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 
-def examine(data: bytes, label: str) -> Tiff | None:
-    """Return the facts in the first directory; None if it cannot be read.
+def examine(data: bytes, label: str) -> tuple[Header, bytes] | None:
+    """Return what the first directory says, and the file for OpenCV to leave colours as they are.
+
+    None: it cannot be read.
 
     Raises
     ------
@@ -316,7 +299,7 @@ def examine(data: bytes, label: str) -> Tiff | None:
         data = _not_multiplied(data, tags)
     # OpenCV moves 10, 12 and 14 bits to the upper end of 16
     white = float(((1 << bits) - 1) << (16 - bits)) if 8 < bits < 16 else None
-    return Tiff(data, white, inverted, _alpha(tags))
+    return Header(white=white, inverted=inverted, alpha=_alpha(tags)), data
 
 
 def orientation(data: bytes) -> int:

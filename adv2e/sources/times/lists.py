@@ -361,14 +361,6 @@ class FrameList:
     order: str = ""
     whole: bool = False
 
-    def check_instants(self, label: str) -> None:
-        """Raise DataError if it has exposures, for sources that do not take these."""
-        if any(stamp.exposure_ns for stamp in self.stamps):
-            raise DataError(
-                f"{label}: exposures, with start and end, are for pictures and stacks: make a"
-                " folder of pictures of these frames, or a list of their middles"
-            )
-
     def told(self, label: str) -> tuple[list[str], list[str]]:
         """Return doubts about the list `label`, and notes on it."""
         notes = [f"times from {label}: {self.columns}"]
