@@ -65,7 +65,10 @@ def find_listing(files: Members) -> Listing | None:
     """Return the list that a folder or zip has, if there is the image that it names first."""
     for known in _KNOWN:
         try:
-            if not files.has(known.place) or not (name := _first_name(files, known)):
+            label = files.label(known.place)
+            if not files.has(known.place):
+                continue
+            if not (name := first_name(decoded(files.read(known.place), label), label)):
                 continue
         except DataError:  # another table under this name
             continue
@@ -135,11 +138,6 @@ def listed_source(
     times = timed(given, pictures, path, label, lambda _: unnamed)
     has_clock = given.fps is None
     return ListedSource(path, listing.kind, times, selection, has_clock=has_clock, light=light)
-
-
-def _first_name(files: Members, listing: Listing) -> str:
-    label = files.label(listing.place)
-    return first_name(decoded(files.read(listing.place), label), label)
 
 
 def _folder(files: Members, listing: Listing, name: str) -> PurePosixPath:
