@@ -16,11 +16,14 @@ References
 
 from __future__ import annotations
 
+import io
 import re
 import struct
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from itertools import takewhile
+from typing import IO
 
 from adv2e.effects.frames.encoding import UNKNOWN
 from adv2e.errors import DataError
@@ -247,6 +250,7 @@ _REDUCED, _MASK = 1, 4
 _WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _LOG_L, _LOG_LUV = 0, 1, 2, 32844, 32845
 _ASSOCIATED, _UNASSOCIATED = 1, 2
 _TYPES = {1: "B", 2: "B", 3: "H", 4: "I", 16: "Q"}
+_SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 6: 1, 7: 1, 8: 2, 9: 4, 10: 8, 11: 4, 12: 8, 16: 8}
 _TEXT, _FLOAT = 2, 3
 _VALUES = 64
 _IMAGEJ = re.compile(rb"ImageJ=.*\nimages=([0-9]{1,9})\n")
@@ -262,6 +266,86 @@ class _Tag:
 
 def is_tiff(data: bytes) -> bool:
     return data[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Type and count of values; the field that holds them, or where they are, and its offset."""
+
+    kind: int
+    count: int
+    field: bytes
+    at: int
+
+
+class Directories:
+    """The directories of a TIFF, read as they are asked for; DataError for what is not there.
+
+    Attributes
+    ----------
+    size : int
+        Of the file [bytes].
+    order, pointer, counter, entry : str
+        Byte order; forms of an offset, of a number of entries, and of an entry.
+    first : int
+        Offset of the first directory.
+    """
+
+    def __init__(self, file: IO[bytes], label: str) -> None:
+        self._file, self._label = file, label
+        self.size = file.seek(0, 2)
+        file.seek(0)
+        self.head = file.read(8)
+        if not is_tiff(self.head):
+            raise self.error("not a TIFF, or damaged")
+        self.order, self.is_big = _order(self.head), 43 in self.head[2:4]
+        self.pointer, self.counter, self.entry = "I", "H", "HHI4s"
+        if self.is_big:
+            self.pointer, self.counter, self.entry = "Q", "Q", "HHQ8s"
+        (self.first,) = self.unpacked(8 if self.is_big else 4, self.pointer)
+
+    def entries(self, at: int) -> tuple[dict[int, Entry], int]:
+        """Return the entries of the directory at an offset, and where the pointer behind it is."""
+        (count,) = self.unpacked(at, self.counter)
+        at += struct.calcsize("=" + self.counter)
+        width = struct.calcsize("=" + self.entry)
+        listed = struct.iter_unpack(self.order + self.entry, self.bytes_at(at, count * width))
+        found = {
+            tag: Entry(kind, length, field, at + width * number - len(field))
+            for number, (tag, kind, length, field) in enumerate(listed, 1)
+        }
+        return found, at + count * width
+
+    def place(self, one: Entry) -> int:
+        """Return the offset of the values of an entry."""
+        if _SIZES.get(one.kind, 0) * one.count <= len(one.field):
+            return one.at
+        (at,) = struct.unpack(self.order + self.pointer, one.field)
+        return int(at)
+
+    def value(self, one: Entry, longest: int = 1 << 20) -> bytes:
+        """Return the values of an entry; those of more than `longest` bytes are damaged."""
+        size = _SIZES.get(one.kind, 0) * one.count
+        if not 0 < size <= longest:
+            raise self.error(f"a tag of {size:,} bytes: damaged")
+        return one.field[:size] if size <= len(one.field) else self.bytes_at(self.place(one), size)
+
+    def unpacked(self, at: int, form: str) -> tuple[int, ...]:
+        """Return the numbers at an offset."""
+        return struct.unpack(self.order + form, self.bytes_at(at, struct.calcsize("=" + form)))
+
+    def bytes_at(self, at: int, size: int) -> bytes:
+        """Return so many bytes from an offset on."""
+        if at + size > self.size:
+            raise self.error(f"cut short, or damaged: {size:,} bytes are expected at byte {at:,}")
+        self._file.seek(at)
+        data = self._file.read(size)
+        if len(data) < size:
+            raise self.error("cut short while it was read")
+        return data
+
+    def error(self, what: str) -> DataError:
+        return DataError(f"{self._label}: {what}")
 
 
 def examine(data: bytes, label: str) -> tuple[Header, bytes] | None:
@@ -341,36 +425,29 @@ def _order(data: bytes) -> str:
 
 def _directories(data: bytes, most: int | None = None) -> list[dict[int, _Tag]]:
     """Return the tags wanted of each directory, up to what is no directory."""
-    if not is_tiff(data):
-        return []
-    order, big = _order(data), 43 in data[2:4]
-    pointer, count, value = ("Q", "Q", 8) if big else ("I", "H", 4)
     found: list[dict[int, _Tag]] = []
     seen: set[int] = set()
-    try:
-        (at,) = struct.unpack_from(order + pointer, data, 8 if big else 4)
+    with suppress(DataError):  # beyond the end, or no TIFF
+        tiff = Directories(io.BytesIO(data), "")
+        at = tiff.first
         while at and at not in seen and len(found) != most:
             seen.add(at)
-            (entries,) = struct.unpack_from(order + count, data, at)
-            at += struct.calcsize(order + count)
-            width = 4 + 2 * value
-            if at + entries * width > len(data):
-                break
-            tags: dict[int, _Tag] = {}
-            for place in range(at, at + entries * width, width):
-                tag, kind, length = struct.unpack_from(f"{order}HH{pointer}", data, place)
-                if tag not in _WANTED or (tag == _DESCRIPTION) != (kind == _TEXT):
-                    continue
-                if kind == _TEXT:
-                    length = min(length, _VALUES)
-                if kind not in _TYPES or not 0 < length <= _VALUES:
-                    continue
-                form, inside = f"{order}{length}{_TYPES[kind]}", place + 4 + value
-                if struct.calcsize(form) > value:
-                    (inside,) = struct.unpack_from(order + pointer, data, inside)
-                tags[tag] = _Tag(struct.unpack_from(form, data, inside), inside)
-            found.append(tags)
-            (at,) = struct.unpack_from(order + pointer, data, at + entries * width)
-    except struct.error:  # beyond the end
-        pass
+            entries, end = tiff.entries(at)
+            found.append(
+                {name: _tag(tiff, one) for name, one in entries.items() if _fits(name, one)}
+            )
+            (at,) = tiff.unpacked(end, tiff.pointer)
     return found
+
+
+def _fits(name: int, one: Entry) -> bool:
+    is_text = one.kind == _TEXT
+    few = is_text or one.count <= _VALUES
+    is_known = name in _WANTED and one.kind in _TYPES
+    return is_known and (name == _DESCRIPTION) == is_text and one.count > 0 and few
+
+
+def _tag(tiff: Directories, one: Entry) -> _Tag:
+    one = replace(one, count=min(one.count, _VALUES))
+    form = f"{one.count}{_TYPES[one.kind]}"
+    return _Tag(struct.unpack(tiff.order + form, tiff.value(one)), tiff.place(one))
