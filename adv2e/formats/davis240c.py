@@ -50,7 +50,7 @@ from adv2e.files.zips import Members
 from adv2e.formats.event_file import EventFile, Facts
 from adv2e.formats.text import lines_of
 from adv2e.formats.text_writer import blocks_of, formatted, text_blocks
-from adv2e.formats.writing import Request, Writer, listed_side, to_json, write_side
+from adv2e.formats.writing import Pieces, Request, Writer, listed_side, to_json, write_side
 from adv2e.label import told_of
 from adv2e.light.pictures import png_of
 from adv2e.sources.frame import Shot
@@ -202,19 +202,14 @@ class ZipWriter(_Davis240cWriter):
         self._events = stack.enter_context(self._archive.open(EVENTS, "w", force_zip64=True))
         self._deflating = OrderedWork(min(1, request.threads - 1))
         stack.callback(self._deflating.abandon)
-        self._text = bytearray()
+        self._text = Pieces(_BLOCK, np.uint8)
         self._encoded = stack.enter_context(closing(Backlog(path.parent, limit=0)))
 
     def write_events(self, events: Events) -> None:
         """Append events."""
         for block in text_blocks(events):
-            self._text += block
-            while len(self._text) >= _BLOCK:
-                self._deflate(self._text[:_BLOCK])
-                del self._text[:_BLOCK]
-
-    def _deflate(self, text: bytearray) -> None:
-        self._deflating.submit(self._events.write, text)
+            for piece in self._text.add(np.frombuffer(block, np.uint8)):
+                self._deflating.submit(self._events.write, piece.data)
 
     def _store_frame(self, name: str, t_ns: int, image: NDArray[Any]) -> None:
         def take(data: bytes) -> None:
@@ -224,7 +219,7 @@ class ZipWriter(_Davis240cWriter):
 
     def finish(self) -> None:
         """Write the remaining events, the list, the frames and the description."""
-        self._deflate(self._text)
+        self._deflating.submit(self._events.write, self._text.take().data)
         self._deflating.finish()
         self._events.close()
         self._archive.getinfo(EVENTS).external_attr = 0o644 << 16
@@ -257,16 +252,18 @@ class E2vidWriter(Writer):
             self._file = stack.enter_context(archive.open(name, "w", force_zip64=True))
         else:
             self._file = stack.enter_context(path.open("wb"))
-        self._text = bytearray(f"{request.width} {request.height}\n".encode())
+        self._text = Pieces(_BLOCK, np.uint8)
+        self._write(f"{request.width} {request.height}\n".encode())
 
     def write_events(self, events: Events) -> None:
         """Append events."""
         for block in text_blocks(events):
-            self._text += block
-            while len(self._text) >= _BLOCK:
-                self._file.write(self._text[:_BLOCK])
-                del self._text[:_BLOCK]
+            self._write(block)
+
+    def _write(self, text: bytes | memoryview) -> None:
+        for piece in self._text.add(np.frombuffer(text, np.uint8)):
+            self._file.write(piece.data)
 
     def finish(self) -> None:
         """Write the remaining lines."""
-        self._file.write(self._text)
+        self._file.write(self._text.take().data)

@@ -143,12 +143,8 @@ class Source(ABC):
         self.height, self.width = image.shape[:2]
         self.whole = Size(self.width, self.height)
         check_pixels(*self.whole, label)
-        crop = self.selection.crop
-        if crop is not None:
-            if not crop.is_inside(*self.whole):
-                raise DataError(
-                    f"{label}: --crop {crop} is not inside its {self.width}x{self.height} pixels"
-                )
+        self.selection.check_crop(self.whole, label)
+        if (crop := self.selection.crop) is not None:
             self.width, self.height = crop.width, crop.height
         self.dtype = image.dtype
         self.colour = image.ndim == 3
@@ -427,6 +423,11 @@ class Selection:
         ends = {"before": self.start_s, "after": self.stop_s}
         told = [f"{side} {end:g} s" for side, end in ends.items() if end is not None]
         return [left_out(f"what is {' and '.join(told)} from the begin")] if told else []
+
+    def check_crop(self, size: Size, label: str) -> None:
+        """Raise DataError if the part that is wanted is not inside a frame of that size."""
+        if self.crop is not None and not self.crop.is_inside(*size):
+            raise DataError(f"{label}: --crop {self.crop} is not inside its {size} pixels")
 
     def of_frame(self, frame: Frame) -> Frame:
         """Return the selected part of a frame, upright, without the rest in memory."""
