@@ -12,12 +12,12 @@ import inspect
 import re
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import MISSING
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from adv2e.config.build import Key, keys_of
 from adv2e.config.model import Config
@@ -27,11 +27,9 @@ from adv2e.errors import ConfigError, one_line
 from adv2e.files.regular import read_text_bytes, reading, shown
 from adv2e.parameters import Section, subsection
 
-if TYPE_CHECKING:
-    from adv2e.effects.hooks import Hooks
 
-
-def config_class(effects: Sequence[type[Hooks]]) -> type[Config]:
+@lru_cache(maxsize=64)
+def config_class(effects: tuple[type[Hooks], ...]) -> type[Config]:
     """Return the class of configurations with a section ``user.<name>`` for each of `effects`.
 
     An effect is on, with the defaults of its parameters, unless the configuration says otherwise.
@@ -41,11 +39,6 @@ def config_class(effects: Sequence[type[Hooks]]) -> type[Config]:
     ConfigError
         Two of them have the same name.
     """
-    return _config_class(tuple(effects))
-
-
-@lru_cache(maxsize=64)
-def _config_class(effects: tuple[type[Hooks], ...]) -> type[Config]:
     if not effects:
         return Config
     by_name: dict[str, type[Hooks]] = {}
