@@ -25,10 +25,10 @@ from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Hooks
 from adv2e.errors import ConfigError, DataError, UsageError
 from adv2e.events import EVENT_DTYPE, Events
-from adv2e.geometry import parse_size
 from adv2e.in_python import reworded
 from adv2e.light.decoding import kernel_table
 from adv2e.light.sensor import Fitting, fitting_of
+from adv2e.options import AnyInput, Run, declared
 
 Image = NDArray[Any]
 
@@ -94,13 +94,10 @@ class Camera:
         count: int | None = None, effects: Sequence[Hooks] = (), threads: int | None = None,
         causes: bool = False,
     ) -> None:  # fmt: skip
-        simulation.check_threads(threads)
-        if count is not None and not (isinstance(count, (int, np.integer)) and count >= 1):
-            raise UsageError(f"count: must be a whole number from 1 on, got {count!r}")
-        try:
-            size = size and parse_size(size)
-        except ValueError as error:
-            raise UsageError(f"size: {error}") from None
+        known = declared(AnyInput, Run)
+        for name, number in (("threads", threads), ("count", count)):
+            known["threads"].checked(name, number)
+        size = known["size"].checked("size", size)
         self.config = load_config(config, seed=seed, size=size)
         self.count = count
         self._given: dict[str, Any] = {"effects": effects, "threads": threads, "causes": causes}

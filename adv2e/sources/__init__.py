@@ -94,7 +94,7 @@ def open_source(path: str | Path, **options: Unpack[SourceOptions]) -> Source:
             raise UsageError("--motion moves before one picture: INPUT must be its file")
         from adv2e.sources import live  # noqa: PLC0415  (needs PyAV)
 
-        return live.open_source(str(path), given, selection, is_camera=is_camera)
+        return live.LiveSource(str(path), given, selection, is_camera)
     named, path = str(path), Path(path)
     with reading(named):
         check_ends(path)
