@@ -21,9 +21,9 @@ import re
 import struct
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import takewhile
-from typing import IO
+from typing import IO, NamedTuple
 
 from adv2e.effects.frames.encoding import UNKNOWN
 from adv2e.errors import DataError
@@ -257,8 +257,7 @@ _IMAGEJ = re.compile(rb"ImageJ=.*\nimages=([0-9]{1,9})\n")
 """Description of stacks of ImageJ that have all pages behind the first, with one directory."""
 
 
-@dataclass(frozen=True)
-class _Tag:
+class _Tag(NamedTuple):
     values: tuple[int, ...]
     at: int
     """Offset of its values in the file [bytes]."""
@@ -268,12 +267,11 @@ def is_tiff(data: bytes) -> bool:
     return data[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 
-@dataclass(frozen=True)
-class Entry:
-    """Type and count of values; the field that holds them, or where they are, and its offset."""
+class Entry(NamedTuple):
+    """Type and number of values; the field that holds them, or where they are, and its offset."""
 
     kind: int
-    count: int
+    length: int
     field: bytes
     at: int
 
@@ -318,14 +316,14 @@ class Directories:
 
     def place(self, one: Entry) -> int:
         """Return the offset of the values of an entry."""
-        if _SIZES.get(one.kind, 0) * one.count <= len(one.field):
+        if _SIZES.get(one.kind, 0) * one.length <= len(one.field):
             return one.at
         (at,) = struct.unpack(self.order + self.pointer, one.field)
         return int(at)
 
     def value(self, one: Entry, longest: int = 1 << 20) -> bytes:
         """Return the values of an entry; those of more than `longest` bytes are damaged."""
-        size = _SIZES.get(one.kind, 0) * one.count
+        size = _SIZES.get(one.kind, 0) * one.length
         if not 0 < size <= longest:
             raise self.error(f"a tag of {size:,} bytes: damaged")
         return one.field[:size] if size <= len(one.field) else self.bytes_at(self.place(one), size)
@@ -441,13 +439,14 @@ def _directories(data: bytes, most: int | None = None) -> list[dict[int, _Tag]]:
 
 
 def _fits(name: int, one: Entry) -> bool:
+    if name not in _WANTED or one.kind not in _TYPES or one.length < 1:
+        return False
     is_text = one.kind == _TEXT
-    few = is_text or one.count <= _VALUES
-    is_known = name in _WANTED and one.kind in _TYPES
-    return is_known and (name == _DESCRIPTION) == is_text and one.count > 0 and few
+    return (name == _DESCRIPTION) == is_text and (is_text or one.length <= _VALUES)
 
 
 def _tag(tiff: Directories, one: Entry) -> _Tag:
-    one = replace(one, count=min(one.count, _VALUES))
-    form = f"{one.count}{_TYPES[one.kind]}"
-    return _Tag(struct.unpack(tiff.order + form, tiff.value(one)), tiff.place(one))
+    if one.length > _VALUES:
+        one = one._replace(length=_VALUES)
+    form = f"{tiff.order}{one.length}{_TYPES[one.kind]}"
+    return _Tag(struct.unpack(form, tiff.value(one)), tiff.place(one))

@@ -124,12 +124,11 @@ def _frame(image: Any, header: Header, says: str, label: str) -> Frame:
     most = white or full_scale_of(colours.dtype)
     if header.inverted:
         colours = np.asarray(most - colours).astype(colours.dtype)
-    frame = Frame(colours)
-    if alpha is not None:
-        frame = with_alpha(colours, alpha, header.alpha, most, label)
-    return replace(
-        frame, white=white, encoding=header.encoding, says=says, densities=header.densities
-    )
+    stated: Any = {"white": white, "encoding": header.encoding, "says": says}
+    stated["densities"] = header.densities
+    if alpha is None:
+        return Frame(colours, **stated)
+    return replace(with_alpha(colours, alpha, header.alpha, most, label), **stated)
 
 
 def upright(image: Image, orientation: int) -> Image:

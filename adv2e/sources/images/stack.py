@@ -88,7 +88,7 @@ class Pages:
                 tiff.bytes_at(start + page.shift, size) for start, size in _places(tiff, tags)
             ]
             values = {
-                tag: (tags[tag].kind, tags[tag].count, tiff.value(tags[tag], _LONGEST))
+                tag: (tags[tag].kind, tags[tag].length, tiff.value(tags[tag], _LONGEST))
                 for tag in _COPIED
                 if tag in tags
             }
@@ -172,7 +172,7 @@ def _places(tiff: Directories, tags: dict[int, Entry]) -> list[tuple[int, int]]:
     for name in _names(tags):
         if name not in tags or tags[name].kind not in _WHOLE:
             raise tiff.error(f"a page without tag {name}: damaged")
-        form = f"{tiff.order}{tags[name].count}{_WHOLE[tags[name].kind]}"
+        form = f"{tiff.order}{tags[name].length}{_WHOLE[tags[name].kind]}"
         found.append(struct.unpack(form, tiff.value(tags[name], tiff.size)))
     starts, sizes = found
     if len(starts) != len(sizes) or sum(sizes) > tiff.size:
@@ -182,7 +182,7 @@ def _places(tiff: Directories, tags: dict[int, Entry]) -> list[tuple[int, int]]:
 
 def _number(tiff: Directories, tags: dict[int, Entry], name: int, default: int) -> int:
     tag = tags.get(name)
-    if tag is None or tag.count != 1 or tag.kind not in _WHOLE:
+    if tag is None or tag.length != 1 or tag.kind not in _WHOLE:
         return default
     number: int = struct.unpack_from(tiff.order + _WHOLE[tag.kind], tag.field)[0]
     return number
