@@ -8,9 +8,6 @@ from typing import NamedTuple
 MOST_PIXELS = 1 << 25
 """Pixels of the largest sensor: 8192x4096."""
 
-_SIZE = re.compile(r"(\d{1,9})[xX](\d{1,9})", re.ASCII)
-_RECTANGLE = re.compile(r"(\d{1,9}),(\d{1,9}),(\d{1,9}),(\d{1,9})", re.ASCII)
-
 
 class Size(NamedTuple):
     """Columns and rows of a picture or a sensor."""
@@ -51,12 +48,7 @@ def parse_size(given: str | tuple[int, ...]) -> Size:
     >>> parse_size("346x260")
     Size(width=346, height=260)
     """
-    text = "x".join(map(str, given)) if isinstance(given, (tuple, list)) else str(given)
-    found = _SIZE.fullmatch(text.replace(" ", ""))
-    size = Size(*map(int, found.groups())) if found else Size(0, 0)
-    if min(size) < 1:
-        raise ValueError(f"must be columns x rows, such as 346x260, got {text!r}")
-    return size
+    return Size(*_numbers(given, "x", 2, "columns x rows, such as 346x260"))
 
 
 def parse_rectangle(given: str | tuple[int, ...]) -> Rectangle:
@@ -72,11 +64,16 @@ def parse_rectangle(given: str | tuple[int, ...]) -> Rectangle:
     >>> parse_rectangle("10,0,320,240")
     Rectangle(x=10, y=0, width=320, height=240)
     """
-    text = given if isinstance(given, str) else ",".join(map(str, given))
-    found = _RECTANGLE.fullmatch(text.replace(" ", ""))
-    part = Rectangle(*map(int, found.groups())) if found else Rectangle(0, 0, 0, 0)
-    if min(part.width, part.height) < 1:
-        raise ValueError(
-            f"must be first column, first row, columns, rows, such as 10,0,320,240, got {text!r}"
-        )
-    return part
+    wanted = "first column, first row, columns, rows, such as 10,0,320,240"
+    return Rectangle(*_numbers(given, ",", 4, wanted))
+
+
+def _numbers(given: str | tuple[int, ...], mark: str, count: int, wanted: str) -> list[int]:
+    """Return so many numbers, with a mark between them, of which the last two are above zero."""
+    text = mark.join(map(str, given)) if isinstance(given, (tuple, list)) else str(given)
+    words = re.split(mark, text.replace(" ", ""), flags=re.IGNORECASE)
+    if len(words) == count and all(re.fullmatch(r"\d{1,9}", word, re.ASCII) for word in words):
+        numbers = list(map(int, words))
+        if min(numbers[-2:]) > 0:
+            return numbers
+    raise ValueError(f"must be {wanted}, got {text!r}")

@@ -95,6 +95,12 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "time": _count,
     "count": _count,
 }
+_METAVARS = {
+    **{"size": "WxH", "rectangle": "X,Y,W,H", "seconds": "S", "share": "SHARE", "time": "TIME"},
+    **{"count": "N", "rate": "F", "path": "FILE"},
+}
+_UNIT = re.compile("_(s|ms|us|px)$")
+"""Unit at the end of a name in Python, which a text on the command line states, or its help."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,9 +121,9 @@ class Option:
     choices : tuple of str
         Values, if there are only few.
     flags : tuple of str
-        Names on the command line, if there is not the one that Python has.
+        Names on the command line, if there is not the one that Python has, without its unit.
     metavar : str
-        Value in the help of the command line.
+        Value in the help of the command line, if its kind does not tell.
     most : int, optional
         Largest value of a number.
     completes : str
@@ -136,7 +142,12 @@ class Option:
 
     def flag_of(self, name: str) -> str:
         """Return the name on the command line of the option that Python calls `name`."""
-        return self.flags[0] if self.flags else "--" + name.replace("_", "-")
+        return self.flags[0] if self.flags else "--" + _UNIT.sub("", name).replace("_", "-")
+
+    @property
+    def shown(self) -> str | None:
+        """What stands for its value in the help of the command line."""
+        return self.metavar or _METAVARS.get(self.kind)
 
     def checked(self, name: str, value: Any) -> Any:
         """Return a value as the code takes it.
@@ -160,6 +171,10 @@ class Option:
             raise UsageError(f"{name}: {error}") from None
 
 
+_flag = functools.partial(Option, default=False)
+"""Declares an option that is given, or not."""
+
+
 class AnyInput(TypedDict, total=False):
     """Options of any input, be it frames or events."""
 
@@ -173,10 +188,9 @@ class AnyInput(TypedDict, total=False):
     ]
     rotate180: Annotated[
         bool,
-        Option(
+        _flag(
             help="Turn frames and events by 180 degrees, first of all: the camera was mounted"
-            " upside down, as for DDD17 and DDD20.",
-            default=False,
+            " upside down, as for DDD17 and DDD20."
         ),
     ]
     track: Annotated[
@@ -196,7 +210,6 @@ class AnyInput(TypedDict, total=False):
             " says how. Of raw video it is the size of the frames, too.",
             usual="as the frames are, or as the file of events says",
             kind="size",
-            metavar="WxH",
         ),
     ]
 
@@ -219,20 +232,13 @@ StartS = Annotated[
     "float | None",
     Option(
         help="Begin S seconds after the first frame; where events are read, after the first event.",
-        flags=("--start",),
         kind="seconds",
-        metavar="S",
     ),
 ]
 
 StopS = Annotated[
     "float | None",
-    Option(
-        help="Stop S seconds after the same.",
-        flags=("--stop",),
-        kind="seconds",
-        metavar="S",
-    ),
+    Option(help="Stop S seconds after the same.", kind="seconds"),
 ]
 
 
@@ -247,7 +253,6 @@ class Part(TypedDict, total=False):
             help="Take a part of each frame or sensor only, before anything else: first column,"
             " first row, columns, rows.",
             kind="rectangle",
-            metavar="X,Y,W,H",
         ),
     ]
 
@@ -257,10 +262,9 @@ class EventInput(AnyInput, EventOrder, Part, total=False):
 
     crop_events: Annotated[
         bool,
-        Option(
+        _flag(
             help="Leave out events outside the sensor, however many.",
             usual="more than 1 % are an error",
-            default=False,
         ),
     ]
 
@@ -274,15 +278,11 @@ class AnyFrames(AnyInput, total=False):
             help="Take the frames at F a second, such as 240 or 30000/1001, whatever the input"
             " says.",
             kind="rate",
-            metavar="F",
         ),
     ]
     allow_damaged: Annotated[
         bool,
-        Option(
-            help="Take what can be decoded of a damaged video, and say what is missing.",
-            default=False,
-        ),
+        _flag(help="Take what can be decoded of a damaged video, and say what is missing."),
     ]
     bayer: Annotated[
         "str | None",
@@ -299,9 +299,7 @@ class FrameInput(AnyFrames, total=False):
 
     timestamps: Annotated[
         "str | Path | None",
-        Option(
-            help="Read the times of the frames from FILE, one a line.", kind="path", metavar="FILE"
-        ),
+        Option(help="Read the times of the frames from FILE, one a line.", kind="path"),
     ]
     pixel_format: Annotated[
         "str | None",
@@ -313,10 +311,7 @@ class FrameInput(AnyFrames, total=False):
     ]
     network: Annotated[
         bool,
-        Option(
-            help="INPUT may be an address, such as rtsp://CAMERA/stream, that FFmpeg opens.",
-            default=False,
-        ),
+        _flag(help="INPUT may be an address, such as rtsp://CAMERA/stream, that FFmpeg opens."),
     ]
 
 
@@ -350,7 +345,6 @@ class MotionOptions(TypedDict, total=False):
         Option(
             help="How far it moves, in pixels of the sensor.",
             usual="6, 8 or 32",
-            flags=("--extent",),
             kind="positive",
             most=1_000_000,
             metavar="PX",
@@ -361,7 +355,6 @@ class MotionOptions(TypedDict, total=False):
         Option(
             help="How long that takes, in seconds.",
             usual="0.3, 1 or 1",
-            flags=("--duration",),
             kind="positive",
             most=1_000_000,
             metavar="S",
@@ -373,7 +366,7 @@ class SourceOptions(FrameInput, Part, Clock, MotionOptions, total=False):
     """Options of an input with frames that are simulated."""
 
 
-Overwrite = Annotated[bool, Option(help="Replace an output that exists.", default=False)]
+Overwrite = Annotated[bool, _flag(help="Replace an output that exists.")]
 
 
 class Content(TypedDict, total=False):
@@ -381,18 +374,14 @@ class Content(TypedDict, total=False):
 
     with_frames: Annotated[
         bool,
-        Option(
-            help="Store the frames, too, in an HDF5 output. DAVIS240C outputs always hold them.",
-            default=False,
-        ),
+        _flag(help="Store the frames, too, in an HDF5 output. DAVIS240C outputs always hold them."),
     ]
     causes: Annotated[
         bool,
-        Option(
+        _flag(
             help="Also store what made each event: the light, leak or a kind of noise. HDF5 holds"
             " it as events/causes, .npz and .csv as a column; beside other formats it is"
-            " OUT.causes.txt.",
-            default=False,
+            " OUT.causes.txt."
         ),
     ]
 
@@ -421,7 +410,6 @@ class Blurred(TypedDict, total=False):
             help="Also write blurred frames, for sets of deblurring: each is the mean of the light"
             " from a frame to the N-th behind it.",
             kind="count",
-            metavar="N",
         ),
     ]
 
@@ -431,11 +419,10 @@ class Strictness(TypedDict, total=False):
 
     strict: Annotated[
         bool,
-        Option(
+        _flag(
             help="Make no guess: what an input does not say, and no option or key does, is an"
             " error that names it.",
             usual="guesses are told, and in the label that 'adv2e info' shows first",
-            default=False,
         ),
     ]
 
@@ -472,7 +459,7 @@ class SimulatedOutput(OutputOptions, Blurred, Strictness, total=False):
     ]
 
 
-Progress = Annotated[bool, Option(help="Show a progress bar on stderr.", default=False)]
+Progress = Annotated[bool, _flag(help="Show a progress bar on stderr.")]
 
 
 Threads = Annotated[
@@ -481,7 +468,6 @@ Threads = Annotated[
         help="Compute with N threads. The result is the same for any N.",
         usual="all cores that this process may use",
         kind="count",
-        metavar="N",
     ),
 ]
 
@@ -509,7 +495,6 @@ class CompareOptions(EventInput, total=False):
         Option(
             help="Compare in windows of S seconds.",
             usual="from frame to frame; 0.05 if MEASURED has no frames",
-            flags=("--window",),
             kind="positive",
             metavar="S",
         ),
@@ -608,10 +593,9 @@ class DiagnoseOptions(EventInput, Run, total=False):
     ]
     fit_thresholds: Annotated[
         bool,
-        Option(
+        _flag(
             help="The contrast thresholds are not known: fit them first, to the totals of ON and"
-            " OFF.",
-            default=False,
+            " OFF."
         ),
     ]
     overwrite: Overwrite
@@ -640,7 +624,6 @@ class FilmOptions(TypedDict, total=False):
             default=6,
             kind="count",
             most=100,
-            metavar="N",
         ),
     ]
     scale: Annotated[
@@ -650,7 +633,6 @@ class FilmOptions(TypedDict, total=False):
             usual="panels about 640 pixels wide",
             kind="count",
             most=32,
-            metavar="N",
         ),
     ]
     max_pictures: Annotated[
@@ -659,7 +641,6 @@ class FilmOptions(TypedDict, total=False):
             help="Most pictures of a film: one wrong time would make far too many.",
             default=MOST_PICTURES,
             kind="count",
-            metavar="N",
         ),
     ]
     overwrite: Overwrite
@@ -672,13 +653,7 @@ class RenderedPart(FilmOptions, total=False):
     stop_s: StopS
     at_s: Annotated[
         "Sequence[float]",
-        Option(
-            help="Show this instant on a sheet.",
-            default=(),
-            flags=("--at",),
-            kind="seconds",
-            metavar="S",
-        ),
+        Option(help="Show this instant on a sheet.", default=(), kind="seconds"),
     ]
     progress: Progress
 
@@ -715,7 +690,6 @@ class RenderOptions(RenderedPart, EventInput, total=False):
         Option(
             help="A picture shows the events of the last MS milliseconds; rate has bins of MS.",
             usual="in a film, those since the picture before; on a sheet 20; of rate a round part",
-            flags=("--window",),
             kind="positive",
             metavar="MS",
         ),
@@ -725,7 +699,7 @@ class RenderOptions(RenderedPart, EventInput, total=False):
 class ViewOptions(EventInput, total=False):
     """Options of a page on which to look at events."""
 
-    no_frames: Annotated[bool, Option(help="Leave out the frames beneath.", default=False)]
+    no_frames: Annotated[bool, _flag(help="Leave out the frames beneath.")]
     overwrite: Overwrite
     progress: Progress
 
@@ -736,9 +710,7 @@ WindowUs = Annotated[
         help="Cut the events into windows of TIME, such as 33ms: of voxel, histogram, surface,"
         " picture and rvt; for ev-segnet the time before each image.",
         usual="rvt, ev-segnet: 50ms; voxel and the like of 'adv2e batch': from image to image",
-        flags=("--window",),
         kind="time",
-        metavar="TIME",
     ),
 ]
 
@@ -750,15 +722,12 @@ Bins = Annotated[
         usual="5; of histogram and rvt 10",
         kind="count",
         most=10_000,
-        metavar="N",
     ),
 ]
 
 Cutoff = Annotated[
     int,
-    Option(
-        help="Largest count of histogram and rvt.", default=10, kind="count", most=255, metavar="N"
-    ),
+    Option(help="Largest count of histogram and rvt.", default=10, kind="count", most=255),
 ]
 
 Valid = Annotated[
@@ -768,7 +737,6 @@ Valid = Annotated[
         " of the images for e2vid of one recording.",
         default=0.2,
         kind="share",
-        metavar="SHARE",
     ),
 ]
 
@@ -777,9 +745,7 @@ class WindowOptions(TypedDict, total=False):
     """Options of an export of something for each window."""
 
     window_us: WindowUs
-    count: Annotated[
-        "int | None", Option(help="Cut into windows of N events.", kind="count", metavar="N")
-    ]
+    count: Annotated["int | None", Option(help="Cut into windows of N events.", kind="count")]
     at: Annotated["str | None", Option(help="Cut where the images are.", choices=("images",))]
     most_empty: Annotated[
         int,
@@ -789,7 +755,6 @@ class WindowOptions(TypedDict, total=False):
             default=MOST_EMPTY,
             flags=("--max-empty",),
             kind="count",
-            metavar="N",
         ),
     ]
     valid: Valid
@@ -845,7 +810,6 @@ class SegmentationOptions(TypedDict, total=False):
             help="Keep the upper N rows.",
             usual="200 of 346x260 pixels, as DDD17 was cut; else all",
             kind="count",
-            metavar="N",
         ),
     ]
     counts: Annotated[
@@ -873,9 +837,7 @@ class SurfaceOptions(WindowOptions, total=False):
         Option(
             help="Time in which a time surface falls to 1/e, such as 30ms.",
             usual="50ms",
-            flags=("--tau",),
             kind="time",
-            metavar="TIME",
         ),
     ]
 
@@ -960,10 +922,9 @@ class BatchOptions(
     ]
     no_events: Annotated[
         bool,
-        Option(
+        _flag(
             help="Keep no events: --export makes voxel grids, histograms, surfaces or pictures"
-            " while it simulates.",
-            default=False,
+            " while it simulates."
         ),
     ]
     window_us: WindowUs
@@ -981,18 +942,12 @@ class BatchOptions(
         Option(
             help="Make a set again by the recipe.json of its batch, and verify it.",
             kind="path",
-            metavar="FILE",
             completes="files",
         ),
     ]
     jobs: Annotated[
         "int | None",
-        Option(
-            help="Convert N sequences at a time.",
-            usual="one for each thread",
-            kind="count",
-            metavar="N",
-        ),
+        Option(help="Convert N sequences at a time.", usual="one for each thread", kind="count"),
     ]
     shard: Annotated[
         "str | None",

@@ -205,16 +205,9 @@ class Cluster:
 
 def _anywhere(job: Job) -> Job:
     """Return the job with paths that do not depend on the folder that a process is in."""
-
-    def whole(path: str) -> str:
-        return str(Path(path).absolute()) if path else path
-
-    return replace(
-        job,
-        source=whole(job.source),
-        output=whole(job.output),
-        export_folder=whole(job.export_folder),
-    )
+    paths = {name: getattr(job, name) for name in ("source", "output", "export_folder")}
+    whole: dict[str, Any] = {name: str(Path(p).absolute()) for name, p in paths.items() if p}
+    return replace(job, **whole)
 
 
 def _address_in(scheduler: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -168,24 +168,9 @@ def _why_export(record: Mapping[str, Any], sequence: Found, wanted: Wanted) -> s
     return "" if digest_of(folder) == made.get("sha256") else "its export changed"
 
 
-def outputs_in_the_way(
-    tasks: Sequence[Task], records: Mapping[str, Mapping[str, Any]], wanted: Wanted
-) -> list[Path]:
-    """Return the outputs that exist but were not made by this batch."""
-    return [
-        path
-        for one in tasks
-        for path in (one.output, wanted.export_folder(one.sequence))
-        if path and one.why and one.sequence.name not in records and path.exists()
-    ]
-
-
-def outputs_outside(tasks: Sequence[Task], wanted: Wanted) -> list[Path]:
-    """Return the outputs that links would put outside of DEST."""
-    dest = wanted.dest.resolve()
-    return [
-        path
-        for one in tasks
-        for path in (one.output, wanted.export_folder(one.sequence))
-        if path and one.why and dest not in path.resolve().parents
-    ]
+def outputs(tasks: Iterable[Task], wanted: Wanted) -> Iterator[tuple[str, Path]]:
+    """Yield the names of sequences and the outputs that are to be made of them."""
+    for one in tasks:
+        if one.why:
+            made = one.output, wanted.export_folder(one.sequence)
+            yield from ((one.sequence.name, path) for path in made if path is not None)

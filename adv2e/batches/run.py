@@ -17,8 +17,7 @@ from adv2e.batches.manifest import Manifest, check_alone, manifest_path, read_re
 from adv2e.batches.plan import (
     Task,
     Wanted,
-    outputs_in_the_way,
-    outputs_outside,
+    outputs,
     parse_shard,
     plan,
     seed_of,
@@ -226,13 +225,14 @@ class Batch:
         tasks = plan(
             self._sequences, self._states, records, self._wanted, overwrite=self._overwrite
         )
-        for path in outputs_outside(tasks, self._wanted):
+        made, dest = list(outputs(tasks, self._wanted)), self.dest.resolve()
+        for path in (path for _, path in made if dest not in path.resolve().parents):
             raise OutputError(f"{shown(path)}: a link leads out of {shown(self.dest)}: remove it")
-        strange = outputs_in_the_way(tasks, records, self._wanted)
-        if strange and not self._overwrite:
+        strange = (path for name, path in made if name not in records and path.exists())
+        for path in strange if not self._overwrite else ():
             raise OutputError(
-                f"{shown(strange[0])}: exists and was not made by this batch: choose another DEST,"
-                " or --overwrite replaces it"
+                f"{shown(path)}: exists and was not made by this batch: choose another DEST, or"
+                " --overwrite replaces it"
             )
         return tasks
 

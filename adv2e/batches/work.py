@@ -179,7 +179,6 @@ It asks for the next one when it can begin it.
 
 
 _VALID_SHARE = 0.2
-_LISTS = ("e2vid-train.txt", "e2vid-valid.txt")
 
 
 @dataclass(frozen=True)
@@ -265,35 +264,34 @@ class Export:
     def write_lists(self, dest: Path, records: Iterable[Mapping[str, Any]]) -> None:
         """Write the lists of what was exported of all sequences, where there are some."""
         of_kind = [one for one in records if one.get("export", {}).get("kind") == self.kind]
+        lists: dict[str, str] = {}
         if self.kind == "e2vid":
-            write_lists(dest, of_kind)
+            lists = _training_lists(dest.resolve(), of_kind)
         elif self.is_set and of_kind:
-            from adv2e.exporting.export import FILES, write_list  # noqa: PLC0415
+            from adv2e.exporting.export import FILES, list_of  # noqa: PLC0415
 
-            with Staging(overwrite=True) as staging, writing(dest):
-                place = staging.file(dest / self.kind / FILES)
-                staging.prepare()
-                write_list(place, [self._row(record["name"]) for record in of_kind])
+            rows = [self._row(record["name"]) for record in of_kind]
+            lists = {f"{self.kind}/{FILES}": list_of(rows)}
+        with Staging(overwrite=True) as staging, writing(dest):
+            places = [(staging.file(dest / name), text) for name, text in lists.items()]
+            staging.prepare()
+            for place, text in places:
+                place.write_text(text, "utf-8", newline="")
 
 
 _FIVE = ("voxel", "ev-segnet", "e2vid")
 """Kinds whose entries tell 5 bins where nothing was asked for."""
 
 
-def write_lists(dest: Path, records: Iterable[Mapping[str, Any]]) -> None:
-    """Write the lists of exported sequences for training and for validation.
+def _training_lists(dest: Path, records: Iterable[Mapping[str, Any]]) -> dict[str, str]:
+    """Return the lists of exported sequences for training and for validation, by their names.
 
     The order comes from their seeds, so that sequences that are added later hardly change it.
     """
-    files = [
-        (record["seed"], dest.resolve() / f"{record['name']}.e2vid" / "sequences")
-        for record in records
-    ]
+    files = [(record["seed"], dest / f"{record['name']}.e2vid" / "sequences") for record in records]
     files.sort(key=lambda one: (one[0], str(one[1])))
     held = math.ceil(_VALID_SHARE * len(files))
-    with Staging(overwrite=True) as staging, writing(dest):
-        places = [staging.file(dest / name) for name in _LISTS]
-        staging.prepare()
-        for place, chosen in zip(places, (files[held:], files[:held]), strict=True):
-            lines = sorted(str(one) for _, folder in chosen for one in folder.glob("*.h5"))
-            place.write_text("".join(f"{line}\n" for line in lines), "utf-8", newline="\n")
+    return {
+        name: "".join(sorted(f"{one}\n" for _, folder in chosen for one in folder.glob("*.h5")))
+        for name, chosen in (("e2vid-train.txt", files[held:]), ("e2vid-valid.txt", files[:held]))
+    }

@@ -14,23 +14,17 @@ from adv2e.options import BatchOptions, size_of
 
 if TYPE_CHECKING:
     from adv2e.batches.run import Batch
-    from adv2e.cli.options import Log
+    from adv2e.cli.options import Layers, Log
 
 
 @click.command("batch", cls=Command)
 @click.argument("source", metavar="SOURCE", shell_complete=completion.files)
 @click.argument("dest", metavar="DEST", shell_complete=completion.files)
-@options.files_option(
-    "Configuration: a YAML file or a shipped name, such as davis346. Repeatable: a later one wins."
+@options.config_options(
+    "Configuration: a YAML file or a shipped name, such as davis346. Repeatable: a later one wins.",
+    "Set one key, such as pixel.low_pass.cutoff_hz=100. Repeatable.",
+    "Seed of the batch. Each sequence has one of its own, made of this and its name.",
 )
-@options.sets_option("Set one key, such as pixel.low_pass.cutoff_hz=100. Repeatable.")
-@click.option(
-    "--seed",
-    type=options.SEED,
-    metavar="N",
-    help="Seed of the batch. Each sequence has one of its own, made of this and its name.",
-)
-@options.effect_option
 @options.declared_options(BatchOptions, help={"format": f"One of: {', '.join(registry.names())}."})
 @click.option("--dry-run", is_flag=True, help="Show what would be done, and write nothing.")
 @click.option("--overwrite", is_flag=True, help="Make all anew, and replace files of others.")
@@ -38,10 +32,7 @@ if TYPE_CHECKING:
 def command(
     source: str,
     dest: str,
-    config_files: tuple[str, ...],
-    sets: tuple[str, ...],
-    seed: int | None,
-    effect_files: tuple[str, ...],
+    layers: Layers,
     given: BatchOptions,
     dry_run: bool,
     overwrite: bool,
@@ -65,13 +56,13 @@ def command(
     """
     from adv2e.batches.run import batch, open_batch, table
 
-    options.check_sets(sets, seed, size_of(given))
-    how: Any = {**given, "sets": sets, "seed": seed, "effects": effect_files}
+    layers.check(size_of(given))
+    how: Any = {**given, "sets": layers.sets, "seed": layers.seed, "effects": layers.effect_files}
     how["overwrite"] = overwrite
     if dry_run:
-        _tell_of(open_batch(source, dest, config_files, **how), log)
+        _tell_of(open_batch(source, dest, layers.config_files, **how), log)
         return
-    outcome = batch(source, dest, config_files, log=log, progress=progress, **how)
+    outcome = batch(source, dest, layers.config_files, log=log, progress=progress, **how)
     lines = table(outcome)
     if log.level >= 0:
         click.echo(lines[0])

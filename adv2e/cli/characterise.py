@@ -11,14 +11,18 @@ from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
 
 if TYPE_CHECKING:
-    from adv2e.cli.options import Log
+    from adv2e.cli.options import Layers, Log
 
 
 @click.command("characterise", cls=Command)
 @click.argument("table", metavar="TABLE", shell_complete=completion.files)
-@options.files_option("What is known of the camera: every key written there is held. Repeatable.")
-@options.sets_option("Declare one key.")
-@click.option("--seed", type=options.SEED, default=0, metavar="N", help="Seed of the drawn tables.")
+@options.config_options(
+    "What is known of the camera: every key written there is held. Repeatable.",
+    "Declare one key.",
+    "Seed of the drawn tables.",
+    usual_seed=0,
+    takes_effects=False,
+)
 @click.option(
     "--where", metavar="COL=VALUE", multiple=True, help="Use only such rows. Repeatable: all hold."
 )
@@ -53,9 +57,7 @@ if TYPE_CHECKING:
 @options.reporting_options
 def command(
     table: str,
-    config_files: tuple[str, ...],
-    sets: tuple[str, ...],
-    seed: int,
+    layers: Layers,
     output: str | None,
     overwrite: bool,
     log: Log,
@@ -88,8 +90,9 @@ def command(
     from adv2e.reports.summary import details_text, summary_text
 
     if output is not None:
-        check_folder(output, overwrite=overwrite, inputs=[table, *options.files_given()])
-    declared = read_declared(config_files, sets, seed)
+        check_folder(output, overwrite=overwrite, inputs=[table, *layers.files()])
+    seed = layers.seed or 0
+    declared = read_declared(layers.config_files, layers.sets, seed)
     chosen = Settings(**settings, seed=seed, log=lambda text: log(text, 1))
     found = characterise(read_table(table), declared, chosen)
     if output is not None:

@@ -12,10 +12,7 @@ from adv2e.options import CompareOptions
 from adv2e.process.bars import reading_bar
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from adv2e.cli.options import Log
-    from adv2e.config import Config
+    from adv2e.cli.options import Layers, Log
 
 
 @click.command("compare", cls=Command)
@@ -34,14 +31,14 @@ if TYPE_CHECKING:
         "crop": "Of all that is read.",
     },
 )
-@options.config_options
+@options.config_options()
 @options.reporting_options
 def command(
     measured: str,
     simulated: str,
     as_json: bool,
     given: dict[str, Any],
-    config: Callable[[], Config],
+    layers: Layers,
     progress: bool,
     log: Log,
 ) -> None:
@@ -68,11 +65,11 @@ def command(
     """
     from adv2e.comparison.compare import compare
 
-    declared = config()
+    declared = layers.config()
     report = compare(
         measured,
         simulated,
-        declared if _configured() else None,
+        declared if layers.first_given else None,
         reading=lambda path: reading_bar(path, progress),
         doubt=log,
         **given,
@@ -85,9 +82,3 @@ def command(
         from adv2e.comparison.report import text
 
         click.echo(text(report))
-
-
-def _configured() -> bool:
-    given = click.get_current_context().params
-    layers = (given["config_files"], given["sets"], given["effect_files"])
-    return any(layers) or given["seed"] is not None

@@ -6,7 +6,8 @@ somebody waits.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import importlib
+from collections.abc import Callable, Iterable
 
 import click
 from click.shell_completion import CompletionItem
@@ -38,29 +39,23 @@ def keys(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
     return starting((f"{key.path}=" for key in all_keys() if not key.is_section), incomplete)
 
 
-def effects(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
-    """Offer the effects that have a page, by all of their names."""
-    from adv2e.effects import named
+def _offering(module: str, function: str) -> Callable[..., Offer]:
+    """Return a completion that offers the names which a function of a module returns."""
 
-    return starting(named(), incomplete)
+    def offer(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
+        return starting(getattr(importlib.import_module(module), function)(), incomplete)
 
-
-def library(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
-    """Offer the effects that a diagnosis looks for."""
-    from adv2e.diagnosis.fitting.library import names
-
-    return starting(names(), incomplete)
+    return offer
 
 
-def formats(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
-    """Offer the formats that can be written."""
-    from adv2e.formats.registry import names
+effects = _offering("adv2e.effects", "named")
+"""Offers the effects that have a page, by all of their names."""
 
-    return starting(names(), incomplete)
+library = _offering("adv2e.diagnosis.fitting.library", "names")
+"""Offers the effects that a diagnosis looks for."""
 
+formats = _offering("adv2e.formats.registry", "names")
+"""Offers the formats that can be written."""
 
-def layouts(ctx: click.Context, param: click.Parameter, incomplete: str) -> Offer:
-    """Offer the layouts of HDF5 files."""
-    from adv2e.formats import registry
-
-    return starting(registry.layouts(), incomplete)
+layouts = _offering("adv2e.formats.registry", "layouts")
+"""Offers the layouts of HDF5 files."""

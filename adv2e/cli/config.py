@@ -12,6 +12,7 @@ from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
 
 if TYPE_CHECKING:
+    from adv2e.cli.options import Layers
     from adv2e.config import Family
 
 
@@ -56,11 +57,16 @@ def group() -> None:
     """
 
 
-def _files_argument(body: options.Body) -> options.Body:
-    """Add FILE..., which is the same as -c FILE; the command gets ``files``, a tuple."""
-    return click.argument(
-        "files", metavar="[FILE]...", nargs=-1, shell_complete=completion.configurations
-    )(body)
+_files_argument = click.argument(
+    "files", metavar="[FILE]...", nargs=-1, shell_complete=completion.configurations
+)
+"""FILE..., which is the same as -c FILE."""
+
+
+def _family_of(files: tuple[str, ...], layers: Layers) -> Family:
+    from adv2e.config import load_family
+
+    return load_family((*files, *layers.config_files), layers.sets, layers.seed, layers.effects())
 
 
 @group.command("list")
@@ -87,20 +93,10 @@ def template(name: str) -> None:
 
 @group.command()
 @_files_argument
-@options.config_parts
-def show(
-    files: tuple[str, ...],
-    config_files: tuple[str, ...],
-    sets: tuple[str, ...],
-    seed: int | None,
-    effect_files: tuple[str, ...],
-) -> None:
+@options.config_options()
+def show(files: tuple[str, ...], layers: Layers) -> None:
     """Print the configuration that FILE (or -c) and --set make, each key explained."""
-    from adv2e.config import load_family
-
-    files = (*files, *config_files)
-    family = load_family(files, sets, seed, options.own_effects(effect_files))
-    _print(family, "resolved configuration")
+    _print(_family_of(files, layers), "resolved configuration")
 
 
 @group.command()
@@ -113,22 +109,14 @@ def defaults() -> None:
 
 @group.command()
 @_files_argument
-@options.config_parts
-def check(
-    files: tuple[str, ...],
-    config_files: tuple[str, ...],
-    sets: tuple[str, ...],
-    seed: int | None,
-    effect_files: tuple[str, ...],
-) -> None:
+@options.config_options()
+def check(files: tuple[str, ...], layers: Layers) -> None:
     """Check what FILE (or -c) and --set make. The exit status is 0 if it is right, 1 if not."""
-    from adv2e.config import load_family
-
-    files = (*files, *config_files)
-    if not files and not sets:
+    named = (*files, *layers.config_files)
+    if not named and not layers.sets:
         raise click.UsageError("FILE is missing: name a configuration to check")
-    load_family(files, sets, seed, options.own_effects(effect_files))
-    click.echo(f"{', '.join(files) or 'defaults'}: ok")
+    _family_of(files, layers)
+    click.echo(f"{', '.join(named) or 'defaults'}: ok")
 
 
 def _print(family: Family, what: str) -> None:

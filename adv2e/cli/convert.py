@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,9 +13,7 @@ from adv2e.formats import registry
 from adv2e.options import ConvertOptions
 
 if TYPE_CHECKING:
-    from adv2e.cli.options import Log
-    from adv2e.config import Config
-    from adv2e.geometry import Size
+    from adv2e.cli.options import Layers, Log
 
 _ENDED = "capture ended: what came is converted; a second Ctrl-C stops at once and keeps nothing"
 
@@ -25,7 +22,7 @@ _ENDED = "capture ended: what came is converted; a second Ctrl-C stops at once a
 @click.argument("source", metavar="INPUT", shell_complete=completion.files)
 @options.output_options
 @options.reporting_options
-@options.config_options
+@options.config_options()
 @options.declared_options(
     ConvertOptions,
     help={
@@ -37,7 +34,7 @@ def command(
     source: str,
     output: str | None,
     overwrite: bool,
-    config: Callable[[Size | None], Config],
+    layers: Layers,
     given: dict[str, Any],
     progress: bool,
     log: Log,
@@ -80,14 +77,14 @@ def command(
 
     wanted = {**given, "overwrite": overwrite, "progress": progress}
     # effects of others may compile what SciPy computes for Numba, which that import leaves out
-    is_ours = not click.get_current_context().params["effect_files"]
+    is_ours = not layers.effect_files
 
     summary = convert_input(
         source,
         output,
-        config,
-        configured=_configured(),
-        also_read=options.files_given,
+        layers.config,
+        configured=layers.first_given,
+        also_read=layers.files,
         log=log,
         begin=import_ahead if is_ours else lambda: None,
         ready=gc.freeze,  # what was imported stays; looking through it for garbage takes time
@@ -96,11 +93,3 @@ def command(
     )
     if log.level >= 0:
         click.echo(summary.text(), err=output == "-")
-
-
-def _configured() -> str:
-    """Return the first option on the command line that says how frames are simulated, or ''."""
-    context = click.get_current_context()
-    names = {item.name: item.opts[-1] for item in context.command.params}
-    asked = ("config_files", "sets", "seed", "effect_files")
-    return next((names[name] for name in asked if context.params[name] not in ((), None)), "")

@@ -11,10 +11,7 @@ from adv2e.cli import options
 from adv2e.cli.commands import Command
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from adv2e.cli.options import Log
-    from adv2e.config import Config
+    from adv2e.cli.options import Layers, Log
 
 
 @click.command("demo", cls=Command)
@@ -28,13 +25,13 @@ if TYPE_CHECKING:
     help="Folder to make.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace what an earlier demo left in it.")
-@options.config_options
+@options.config_options()
 @options.threads_option
 @options.reporting_options
 def command(
     output: Path,
     overwrite: bool,
-    config: Callable[[], Config],
+    layers: Layers,
     threads: int | None,
     progress: bool,
     log: Log,
@@ -52,7 +49,7 @@ def command(
     from adv2e.conversion.demo import run_demo
 
     demo = run_demo(
-        output, config(), overwrite=overwrite, threads=threads, progress=progress, log=log
+        output, layers.config(), overwrite=overwrite, threads=threads, progress=progress, log=log
     )
     if log.level >= 0:
         click.echo(demo.text())

@@ -11,22 +11,18 @@ from adv2e.cli.commands import Command
 from adv2e.options import DiagnoseOptions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from adv2e.cli.options import Log
-    from adv2e.config import Config
-    from adv2e.geometry import Size
+    from adv2e.cli.options import Layers, Log
 
 
 @click.command("diagnose", cls=Command)
 @click.argument("recordings", metavar="RECORDING...", nargs=-1, shell_complete=completion.files)
-@options.config_options
+@options.config_options()
 @options.output_options
 @options.reporting_options
 @options.declared_options(DiagnoseOptions, help={"start_s": "Here, the first frame."})
 def command(
     recordings: tuple[str, ...],
-    config: Callable[[Size | None], Config],
+    layers: Layers,
     output: str | None,
     overwrite: bool,
     given: dict[str, Any],
@@ -72,17 +68,15 @@ def command(
     from adv2e.files.regular import shown
     from adv2e.reports.summary import summary_text
 
-    declared = config(given["size"])
-    params = click.get_current_context().params
-    layers = params["config_files"], params["sets"]
+    declared = layers.config(given["size"])
     named = given["films"] if given["films"] and not recordings else (*recordings, "")[0]
     folder = Path(output or f"{Path(named).stem}.diagnosis")
     found = diagnose_file(
         recordings,
         declared,
-        name=names_of(*layers),
-        written=written_keys(*layers),
-        also_read=options.files_given(),
+        name=names_of(layers.config_files, layers.sets),
+        written=written_keys(layers.config_files, layers.sets),
+        also_read=layers.files(),
         output=folder,
         overwrite=overwrite,
         progress=progress,

@@ -110,125 +110,120 @@ def rate(ctx: click.Context, param: click.Parameter, value: str | None) -> str |
     return value
 
 
-def effect_option(body: Body) -> Body:
-    """Add --effect; the command gets ``effect_files``, a tuple, for :func:`own_effects`."""
-    return click.option(
-        "--effect",
-        "effect_files",
-        metavar="FILE.py",
-        shell_complete=completion.files,
-        multiple=True,
-        help="Add effects of your own. Their parameters are user.NAME in the configuration."
-        " Repeatable.",
-    )(body)
+@dataclass(frozen=True)
+class Layers:
+    """What -c, --set, --seed and --effect say of a configuration.
 
-
-def own_effects(files: tuple[str, ...]) -> list[type[Hooks]]:
-    """Return the effects that files hold."""
-    if not files:
-        return []
-    from adv2e.config.user_effects import load_effects
-
-    return [effect for name in files for effect in load_effects(name)]
-
-
-def files_given() -> list[str | Path]:
-    """Return the configurations and effects that the command line names."""
-    from adv2e.config.files import find
-
-    given = click.get_current_context().params
-    return [*map(find, given["config_files"]), *given.get("effect_files", ())]
-
-
-def files_option(text: str) -> Callable[[Body], Body]:
-    """Return a decorator that adds -c, with the help `text`; passes ``config_files``, a tuple."""
-    return click.option(
-        "-c",
-        "--config",
-        "config_files",
-        metavar="FILE",
-        multiple=True,
-        shell_complete=completion.configurations,
-        help=text,
-    )
-
-
-def sets_option(text: str) -> Callable[[Body], Body]:
-    """Return a decorator that adds --set, with the help `text`; passes ``sets``, a tuple."""
-    return click.option(
-        "--set",
-        "sets",
-        metavar="KEY=VALUE",
-        multiple=True,
-        shell_complete=completion.keys,
-        help=text,
-    )
-
-
-def config_parts(body: Body) -> Body:
-    """Add -c, --set, --seed and --effect; the command gets config_files, sets, seed, effect_files.
-
-    See :func:`config_options`.
+    Configurations know of all effects, and importing these takes its time: what is to be said
+    before that comes before the methods.
     """
-    for decorator in (
-        effect_option,
+
+    config_files: tuple[str, ...]
+    sets: tuple[str, ...]
+    seed: int | None
+    effect_files: tuple[str, ...]
+
+    @property
+    def first_given(self) -> str:
+        """The first of these options that was given, or ""."""
+        flags = {"--config": self.config_files, "--set": self.sets, "--seed": self.seed}
+        flags["--effect"] = self.effect_files
+        return next((flag for flag, value in flags.items() if value not in ((), None)), "")
+
+    def files(self) -> list[str | Path]:
+        """Return the configurations and effects that the command line names."""
+        from adv2e.config.files import find
+
+        return [*map(find, self.config_files), *self.effect_files]
+
+    def effects(self) -> list[type[Hooks]]:
+        """Return the effects that the files of --effect hold."""
+        if not self.effect_files:
+            return []
+        from adv2e.config.user_effects import load_effects
+
+        return [effect for name in self.effect_files for effect in load_effects(name)]
+
+    def check(self, size: Size | None = None) -> None:
+        """Raise UsageError if --set says what --seed or --size says, too."""
+        from adv2e.config import written_keys
+
+        keys = {"--seed": ("seed",), "--size": ("sensor.width", "sensor.height")}
+        given = {"--seed": self.seed, "--size": size}
+        for key in written_keys((), self.sets):
+            for option in (name for name in given if given[name] is not None and key in keys[name]):
+                raise click.UsageError(f"--set {key} and {option} both say it: keep one")
+
+    def config(self, size: Size | None = None) -> Config:
+        """Return the configuration, for a sensor of a size if one is given."""
+        from adv2e.config import load_config
+
+        self.check(size)
+        return load_config(self.config_files, self.sets, self.seed, self.effects(), size=size)
+
+
+def config_options(
+    files: str = "Configuration: a YAML file or a shipped name, such as davis346 (see 'adv2e config"
+    " --help'). Repeatable: a later one wins, key by key.",
+    sets: str = "Set one key, such as pixel.low_pass.cutoff_hz=100. null switches an effect off:"
+    " pixel.leak=null. Repeatable.",
+    seed: str = "Seed of all random numbers. The same seed gives the same events.",
+    *,
+    usual_seed: int | None = None,
+    takes_effects: bool = True,
+) -> Callable[[Body], Body]:
+    """Return a decorator that adds -c, --set, --seed, with such help, and --effect.
+
+    The command gets ``layers``, :class:`Layers`.
+    """
+    added = [
         click.option(
-            "--seed",
-            type=SEED,
-            metavar="N",
-            help="Seed of all random numbers. The same seed gives the same events.",
+            "-c",
+            "--config",
+            "config_files",
+            metavar="FILE",
+            multiple=True,
+            shell_complete=completion.configurations,
+            help=files,
         ),
-        sets_option(
-            "Set one key, such as pixel.low_pass.cutoff_hz=100. null switches an effect off:"
-            " pixel.leak=null. Repeatable."
+        click.option(
+            "--set",
+            "sets",
+            metavar="KEY=VALUE",
+            multiple=True,
+            shell_complete=completion.keys,
+            help=sets,
         ),
-        files_option(
-            "Configuration: a YAML file or a shipped name, such as davis346 (see 'adv2e config"
-            " --help'). Repeatable: a later one wins, key by key."
+        click.option("--seed", type=SEED, default=usual_seed, metavar="N", help=seed),
+        click.option(
+            "--effect",
+            "effect_files",
+            metavar="FILE.py",
+            shell_complete=completion.files,
+            multiple=True,
+            help="Add effects of your own. Their parameters are user.NAME in the configuration."
+            " Repeatable.",
         ),
-    ):
-        body = decorator(body)
-    return body
+    ]
 
+    def decorate(body: Body) -> Body:
+        @functools.wraps(body)
+        def with_layers(
+            *args: Any,
+            config_files: tuple[str, ...],
+            sets: tuple[str, ...],
+            seed: int | None,
+            effect_files: tuple[str, ...] = (),
+            **kw: Any,
+        ) -> Any:
+            return body(*args, layers=Layers(config_files, sets, seed, effect_files), **kw)
 
-def check_sets(sets: tuple[str, ...], seed: int | None, size: Size | None) -> None:
-    """Raise UsageError if --set says what --seed or --size says, too."""
-    from adv2e.config import written_keys
+        made: Any = with_layers
+        for option in reversed(added if takes_effects else added[:-1]):
+            made = option(made)
+        return made  # type: ignore[no-any-return]
 
-    keys = {"--seed": ("seed",), "--size": ("sensor.width", "sensor.height")}
-    given = {"--seed": seed, "--size": size}
-    for key in written_keys((), sets):
-        for option in (name for name in given if given[name] is not None and key in keys[name]):
-            raise click.UsageError(f"--set {key} and {option} both say it: keep one")
-
-
-def config_options(body: Body) -> Body:
-    """Add those of :func:`config_parts`; the command gets ``config``, a function.
-
-    It returns the Config, for a sensor of a size if it is given one.  A command that has other
-    things to begin with calls it after those: configurations know of all effects, and importing
-    these takes its time.
-    """
-
-    @config_parts
-    @functools.wraps(body)
-    def with_config(
-        *args: Any,
-        config_files: tuple[str, ...],
-        sets: tuple[str, ...],
-        seed: int | None,
-        effect_files: tuple[str, ...],
-        **kw: Any,
-    ) -> Any:
-        def config(size: Size | None = None) -> Config:
-            from adv2e.config import load_config
-
-            check_sets(sets, seed, size)
-            return load_config(config_files, sets, seed, own_effects(effect_files), size=size)
-
-        return body(*args, config=config, **kw)
-
-    return with_config  # type: ignore[return-value]
+    return decorate
 
 
 POSITIVE = FiniteNumber(min=0, min_open=True)
@@ -267,7 +262,7 @@ def declared_options(*groups: Any, help: Mapping[str, str] | None = None) -> Cal
 
 
 def _click_option(name: str, option: Option, help: str = "") -> Callable[[Body], Body]:
-    about: dict[str, Any] = {"default": option.default, "metavar": option.metavar or None}
+    about: dict[str, Any] = {"default": option.default, "metavar": option.shown}
     text = f"{option.help} {help}".rstrip()
     if option.default == ():
         about["multiple"], text = True, f"{text} Repeatable."

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
-from adv2e.options import RenderOptions, check_together
-from adv2e.process.bars import reading_bar
+from adv2e.options import RenderOptions
 
 if TYPE_CHECKING:
     from adv2e.cli.options import Log
@@ -33,7 +32,7 @@ def command(
     log: Log,
     frames: bool | None,
     progress: bool,
-    given: RenderOptions,
+    given: dict[str, Any],
 ) -> None:
     """Make pictures and films of events.
 
@@ -55,19 +54,8 @@ def command(
     """
     if output is None:
         raise click.UsageError("-o is missing: a .mp4, .webm, .avi, .gif or .png file")
-    check_together(given)
-    from adv2e.formats.reading import read_events
-    from adv2e.options import RenderedPart, chosen
-    from adv2e.rendering import render_recording
-    from adv2e.rendering.render import chosen_style, reading_of
+    from adv2e.rendering.render import render
 
-    style = chosen_style(output, given)
-    with reading_bar(events, progress) as told:
-        recording = read_events(events, progress=told, **reading_of(given))
-    for problem in recording.problems:
-        log(f"{events}: {problem}")
-    if frames and recording.frame_times_ns is None:
-        log(f"{events}: holds no frames to show beside the events")
-    shown = chosen(RenderedPart, {**given, "overwrite": overwrite, "progress": progress})
-    render_recording(recording, output, style=style, frames=frames is not False, **shown)
+    how = {**given, "overwrite": overwrite, "progress": progress}
+    render(events, output, frames=frames, doubt=log, **how)
     log(f"{output}: written")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from adv2e.errors import UsageError
 from adv2e.options import SensorOptions
 
 if TYPE_CHECKING:
-    from adv2e.cli.options import Log
+    from adv2e.cli.options import Layers, Log
 
 
 @click.command("sensor", cls=Command)
@@ -22,17 +23,14 @@ if TYPE_CHECKING:
 )
 @options.declared_options(SensorOptions)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON: all numbers and curves.")
-@options.config_parts
+@options.config_options()
 @options.output_options
 @options.reporting_options
 def command(
     sensors: tuple[str, ...],
     given: dict[str, Any],
     as_json: bool,
-    config_files: tuple[str, ...],
-    sets: tuple[str, ...],
-    seed: int | None,
-    effect_files: tuple[str, ...],
+    layers: Layers,
     output: str | None,
     overwrite: bool,
     progress: bool,
@@ -54,7 +52,7 @@ def command(
     """
     import json
 
-    from adv2e.config import load_config, names_of
+    from adv2e.config import names_of
     from adv2e.config.files import find
     from adv2e.files.staging import Staging
     from adv2e.inspection.sensor import measured
@@ -65,13 +63,12 @@ def command(
         if outputs[0].suffix:
             raise UsageError(f"-o {output}: must end in .html, or name a folder")
         outputs = [outputs[0] / f"sensor.{suffix}" for suffix in ("html", "json")]
-    options.check_sets(sets, seed, None)
-    effects, chosen = options.own_effects(effect_files), []
+    chosen = []
     for named in [[name] for name in sensors] or [[]]:
-        files = [*named, *config_files]
-        config = load_config(files, sets, seed, effects)
-        chosen.append((names_of(files, sets) or "adv2e", config))
-    inputs = [*options.files_given(), *map(find, sensors)]
+        one = replace(layers, config_files=(*named, *layers.config_files))
+        config = one.config()
+        chosen.append((names_of(one.config_files, one.sets) or "adv2e", config))
+    inputs = [*layers.files(), *map(find, sensors)]
     for path in outputs:
         Staging(overwrite, inputs).file(path)  # before the work: raises if it cannot be
     found = measured(chosen, **given)

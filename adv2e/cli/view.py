@@ -9,7 +9,7 @@ import click
 
 from adv2e.cli import completion, options
 from adv2e.cli.commands import Command
-from adv2e.options import ViewOptions, check_together
+from adv2e.options import ViewOptions
 
 if TYPE_CHECKING:
     from adv2e.cli.options import Log
@@ -37,7 +37,6 @@ def command(
 
     Without -o, it is <stem>.view.html in the current folder. 'Keys' on the page lists its keys.
     """
-    check_together(given)
     from adv2e.rendering.view import view
 
     if output is None:

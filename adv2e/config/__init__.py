@@ -116,7 +116,7 @@ def _written(
     configs = (layer for layer in layers if isinstance(layer, Config))
     own = {effect: None for config in configs for effect in user_effects(config).values()}
     added = [effect for effect in effects if effect not in own]
-    return config_class([*own, *added]), _merged(layers, _texts(sets), seed, size)
+    return config_class((*own, *added)), _merged(layers, _texts(sets), seed, size)
 
 
 class Family:
@@ -271,7 +271,7 @@ def from_dict(
     ConfigError
         As for a file; the text begins with `name`.
     """
-    return build(config_class(effects), _tree(values, Origin(name)))
+    return build(config_class(tuple(effects)), _tree(values, Origin(name)))
 
 
 def _name(key: Any) -> str:

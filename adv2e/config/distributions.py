@@ -270,20 +270,17 @@ def _law(path: str, value: Value, *, whole: bool = False) -> _Law:
         raise value.origin.complaint(path, f"must be a number, or one of {_FORMS}, got {value}")
     ((name, given),) = content.items()
     path = f"{path}.{name}"
-    wanted = {
-        "uniform": "[a, b] with a below b",
-        "log_uniform": "[a, b] with a above 0 and below b",
-        "normal": "[mean, deviation] with a deviation above 0",
-        "choice": "a list of numbers, [a, b, ...]",
-    }[name]
     listed = given.content if isinstance(given.content, list) else []
     numbers = tuple(_number(path, item, whole=whole) for item in listed)
     pair = len(numbers) == 2
-    right = {
-        "uniform": pair and numbers[0] < numbers[1],
-        "log_uniform": pair and 0 < numbers[0] < numbers[1],
-        "normal": pair and numbers[1] > 0,
-        "choice": bool(numbers),
+    wanted, right = {
+        "uniform": ("[a, b] with a below b", pair and numbers[0] < numbers[1]),
+        "log_uniform": (
+            "[a, b] with a above 0 and below b",
+            pair and 0 < numbers[0] < numbers[1],
+        ),
+        "normal": ("[mean, deviation] with a deviation above 0", pair and numbers[1] > 0),
+        "choice": ("a list of numbers, [a, b, ...]", bool(numbers)),
     }[name]
     if not right:
         raise given.origin.complaint(path, f"must be {wanted}, got {given}")

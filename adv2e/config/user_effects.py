@@ -12,26 +12,24 @@ import inspect
 import re
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import MISSING
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from adv2e.config.build import Key, keys_of
 from adv2e.config.model import Config
 from adv2e.effects import STAGES
 from adv2e.effects.hooks import Hooks
 from adv2e.errors import ConfigError, one_line
-from adv2e.files.regular import read_text_bytes, shown
+from adv2e.files.regular import read_text_bytes, reading, shown
 from adv2e.parameters import Section, subsection
 
-if TYPE_CHECKING:
-    from adv2e.effects.hooks import Hooks
 
-
-def config_class(effects: Sequence[type[Hooks]]) -> type[Config]:
+@lru_cache(maxsize=64)
+def config_class(effects: tuple[type[Hooks], ...]) -> type[Config]:
     """Return the class of configurations with a section ``user.<name>`` for each of `effects`.
 
     An effect is on, with the defaults of its parameters, unless the configuration says otherwise.
@@ -41,11 +39,6 @@ def config_class(effects: Sequence[type[Hooks]]) -> type[Config]:
     ConfigError
         Two of them have the same name.
     """
-    return _config_class(tuple(effects))
-
-
-@lru_cache(maxsize=64)
-def _config_class(effects: tuple[type[Hooks], ...]) -> type[Config]:
     if not effects:
         return Config
     by_name: dict[str, type[Hooks]] = {}
@@ -102,10 +95,8 @@ def load_effects(path: str | Path) -> list[type[Hooks]]:
         the text names the file and, where there is one, the line.
     """
     path = Path(path)
-    try:
+    with reading(path, ConfigError):
         source = read_text_bytes(path, ConfigError)
-    except OSError as error:
-        raise ConfigError(f"{path}: {error.strerror or error}") from None
     digest = hashlib.sha256(source).hexdigest()
     module = _run(path, source, f"adv2e_effect_{digest[:16]}")
     found = [

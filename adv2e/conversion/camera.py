@@ -28,6 +28,7 @@ from adv2e.events import EVENT_DTYPE, Events
 from adv2e.in_python import reworded
 from adv2e.light.decoding import kernel_table
 from adv2e.light.sensor import Fitting, fitting_of
+from adv2e.options import Run, declared
 
 Image = NDArray[Any]
 
@@ -93,9 +94,9 @@ class Camera:
         count: int | None = None, effects: Sequence[Hooks] = (), threads: int | None = None,
         causes: bool = False,
     ) -> None:  # fmt: skip
-        simulation.check_threads(threads)
-        if count is not None and not (isinstance(count, (int, np.integer)) and count >= 1):
-            raise UsageError(f"count: must be a whole number from 1 on, got {count!r}")
+        known = declared(Run)
+        for name, number in (("threads", threads), ("count", count)):
+            known["threads"].checked(name, number)
         self.config = load_config(config, seed=seed, size=size)
         self.count = count
         self._given: dict[str, Any] = {"effects": effects, "threads": threads, "causes": causes}

@@ -19,7 +19,8 @@ from adv2e.files.regular import shown
 from adv2e.files.staging import Staging
 from adv2e.formats.reading import read_events
 from adv2e.formats.writing import open_sink
-from adv2e.rendering import Style, render_recording
+from adv2e.rendering.recording import render_recording
+from adv2e.rendering.styles import Style
 from adv2e.rendering.timeline import caption
 from adv2e.synthetic import Scene
 from adv2e.synthetic.scene import RAMP_S, frame_times, write_video

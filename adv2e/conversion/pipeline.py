@@ -517,7 +517,7 @@ def _open_preview(
 ) -> Timeline | None:
     if preview is None:
         return None
-    from adv2e.rendering import open_preview  # noqa: PLC0415 - most conversions draw nothing
+    from adv2e.rendering.recording import open_preview  # noqa: PLC0415 - most draw nothing
 
     return stack.enter_context(
         open_preview(Path(preview), width, height, frames=True, staging=staging)

@@ -140,11 +140,6 @@ class Reading(ExitStack):
         return self._opened
 
     @property
-    def is_open(self) -> bool:
-        """True if the source was opened."""
-        return isinstance(self._opened, Source)
-
-    @property
     def inputs(self) -> tuple[str | Path, ...]:
         """Files that are read: those of the source, and the list of times if there is one."""
         source = () if self.path == STDIN else self.source.inputs
@@ -152,7 +147,7 @@ class Reading(ExitStack):
 
     def capturing(self, told: str) -> AbstractContextManager[None]:
         """Return a context within which Ctrl-C ends a pipe's frames, as `told`; see `Source`."""
-        return self.source.capturing(told) if self.is_open else nullcontext()
+        return self._opened.capturing(told) if isinstance(self._opened, Source) else nullcontext()
 
     def decoded(self, decoding: Decoding) -> Iterator[Decoded]:
         """Return the frames, as `decoding` says; raises what goes wrong with them."""

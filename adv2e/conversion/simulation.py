@@ -23,12 +23,13 @@ from adv2e.effects.frames.brightness import bounded, check_floats
 from adv2e.effects.frames.encoding import LightDecoder, full_scale_of
 from adv2e.effects.hooks import Frames, Hooks, LightFrame
 from adv2e.effects.reorder_buffer import InOrder
-from adv2e.errors import ConfigError, DataError, UsageError, warn
+from adv2e.errors import ConfigError, DataError, warn
 from adv2e.events import Events, empty_events
 from adv2e.label import Label
 from adv2e.light.decoding import decoder_for, kernel_table, light_line, light_text
 from adv2e.light.intervals import Intervals
 from adv2e.light.sensor import fitting_of
+from adv2e.options import Run, declared
 from adv2e.pixel.array import PixelArray
 from adv2e.pixel.steps import PRECISE, Coarseness
 from adv2e.process import bars
@@ -123,7 +124,7 @@ def simulate(
     """
     if not isinstance(config, Config) or seed is not None or size is not None:
         config = load_config(config, seed=seed, size=size)
-    check_threads(threads)
+    declared(Run)["threads"].checked("threads", threads)
     instants, has_rate = _instants(times, fps)
     _check_numbers(frames, times)
     hooks = active_hooks(config, effects)
@@ -163,12 +164,6 @@ def simulate(
 def _check_numbers(frames: object, times: object) -> None:
     if isinstance(frames, Sized) and isinstance(times, Sized) and len(frames) != len(times):
         raise DataError(f"{len(times)} times for {len(frames)} frames")
-
-
-def check_threads(threads: Any) -> None:
-    """Raise UsageError unless it is a number of threads, or None."""
-    if threads is not None and not (isinstance(threads, (int, np.integer)) and threads >= 1):
-        raise UsageError(f"threads: must be a whole number from 1 on, got {threads!r}")
 
 
 def _filled(chunks: Iterator[Events]) -> Iterator[Events]:

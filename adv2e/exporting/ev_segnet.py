@@ -24,7 +24,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.exporting.voxels import Slice, save_picture
+from adv2e.exporting.voxels import Slice
+from adv2e.light.pictures import png_of
 from adv2e.representations.voxel_grid import event_image
 
 DDD17 = (346, 260)
@@ -57,6 +58,6 @@ def write_event_images(
         picture = event_image(kept, (size[0], rows), window, scale_counts=is_scaled)
         stem = f"{name}_export_{number}"
         np.save(events_in / f"{stem}.npy", picture, allow_pickle=False)
-        save_picture(images_in / f"{stem}.png", image[:rows])
+        (images_in / f"{stem}.png").write_bytes(png_of(image[:rows]))
         number += 1
     return number

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -16,7 +17,7 @@ from adv2e import __version__
 from adv2e.conversion.transfer import clock_of
 from adv2e.errors import UsageError, warn
 from adv2e.exporting import e2vid, ev_segnet
-from adv2e.exporting.layouts import LAYOUTS, Layout, check_kind, chosen_options
+from adv2e.exporting.layouts import LAYOUTS, check_kind, chosen_options
 from adv2e.exporting.sequence import MADE_BY_US, Sequence, check_once, is_tree, open_sequences
 from adv2e.exporting.targets import Targets
 from adv2e.exporting.voxels import before_images
@@ -108,28 +109,50 @@ def export(
     paths = [events] if isinstance(events, (str, Path)) else list(events)
     if len(paths) > 1 and options["side"] not in (None, "none"):
         raise UsageError("--side: is of one recording, and there are several: export one by one")
-    reading = {**chosen(EventInput, options), "targets": targets}
+    began = time.perf_counter()
     how = chosen_options(to, options)
     described = {"to": to, **how}
     how |= {"threads": options["threads"]}
-    if to == "e2vid":
-        what, write = "sequences", _e2vid(Path(output), how)
-    elif to == "ev-segnet":
-        what, write = "pictures of events", _ev_segnet(how)
-    else:
-        what, write = LAYOUTS[to].what, _units(LAYOUTS[to], how, is_tree([*map(Path, paths)]))
-    overwrite = options["overwrite"]
-    return _exported(
-        paths,
-        output,
-        described,
-        what,
-        write,
-        overwrite=overwrite,
-        doubt=doubt,
-        side=options["side"],
-        **reading,
-    )
+    sequences = open_sequences(paths, targets, options["side"], **chosen(EventInput, options))
+    told: dict[str, Any] = {"sequences": [], "doubts": []}
+    read = [one for sequence in sequences for one in sequence.file.inputs]
+    with Staging(options["overwrite"], read) as staging, writing(output):
+        folder = staging.folder(Path(output), foreign)
+        staging.prepare()
+        folder.mkdir()
+        if to == "e2vid":
+            what, items = "sequences", _write_e2vid(sequences, folder, Path(output), how, told)
+        elif to == "ev-segnet":
+            what, items = "pictures of events", _write_ev_segnet(sequences, folder, how, told)
+        else:
+            of_tree = is_tree([*map(Path, paths)])
+            what, items = LAYOUTS[to].what, _write_units(to, sequences, folder, how, told, of_tree)
+        for sequence in sequences:
+            _write_side(sequence, folder / "side" / sequence.name)
+            told["doubts"] += sequence.told
+        doubts = told.pop("doubts")
+        entries = sorted([entry.name for entry in folder.iterdir()] + [DESCRIPTION])
+        inputs = [
+            {
+                "name": sequence.name,
+                "file": shown(sequence.file.facts.path.name),
+                "label": report_of(sequence.file.facts.description, sequence.file.facts.problems),
+            }
+            for sequence in sequences
+        ]
+        asked = {name: options[name] for name in ("start_s", "stop_s", "crop")}
+        part = {name: value for name, value in asked.items() if value is not None}
+        described |= {"part": part} if part else {}
+        text = {"adv2e": __version__, **described, "inputs": inputs, **told, "entries": entries}
+        (folder / DESCRIPTION).write_text(json.dumps(text, indent=2) + "\n", "utf-8", newline="\n")
+    for sequence in sequences:
+        doubts += [
+            f"{sequence.file.facts.path}: {problem}"
+            for problem in dict.fromkeys(sequence.file.facts.problems)
+        ]
+    for line in doubts:
+        doubt(line)
+    return Exported(str(output), len(sequences), items, what, time.perf_counter() - began)
 
 
 @takes(ExportOptions, *EXPORTS.values())
@@ -162,139 +185,66 @@ def export_unit(
     return items
 
 
-def _units(layout: Layout, how: Mapping[str, Any], of_tree: bool) -> Write:
-    """Return a writer of recordings, each to its place; with lists, of a tree or of a set."""
-
-    def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
-        rows = []
-        for sequence in sequences:
-            place, label, split = layout.place_of(sequence.name, how["valid"])
-            rows.append((str(place), label, split))
-        check_once([row[0] for row in rows])
-        for sequence, (where, *_) in zip(sequences, rows, strict=True):
-            size, items = layout.write(sequence, folder / where, how, told["doubts"].append)
-            told["sequences"].append({"name": sequence.name, "size": list(size), "items": items})
-        if of_tree or layout.place != "{name}":
-            write_list(folder / FILES, rows)
-        return sum(entry["items"] for entry in told["sequences"])
-
-    return write
-
-
-def write_list(path: Path, rows: Iterable[tuple[str, str, str]]) -> None:
-    """Write a list of files or folders, their classes, and parts of the set that they are in."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        lines = csv.writer(file, lineterminator="\n")
-        lines.writerow(("file", "class", "split"))
-        lines.writerows(sorted(rows))
-
-
-def _ev_segnet(how: Mapping[str, Any]) -> Write:
-    def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
-        check_once([sequence.flat for sequence in sequences])
-        for sequence in sequences:
-            size, _, parts = events_in_order(sequence.file)
-            slices = before_images(parts, sequence.image_times_us, how["window_us"])
-            images = (image for _, image in e2vid.images_of(sequence))
-            items = ev_segnet.write_event_images(sequence.flat, slices, images, size, folder, how)
-            told["sequences"].append({"name": sequence.name, "size": list(size), "items": items})
-        return sum(entry["items"] for entry in told["sequences"])
-
-    return write
-
-
-def _e2vid(output: Path, how: Mapping[str, Any]) -> Write:
-    def write(sequences: list[Sequence], folder: Path, told: dict[str, Any]) -> int:
-        for sequence in sequences:
-            number = len(sequence.image_times_us)
-            if number < e2vid.USUAL_FRAMES:
-                told["doubts"].append(
-                    f"{sequence.file.facts.path}: {number} images; a loader of 40 intervals, as"
-                    f" event_cnn_minimal has it, needs {e2vid.USUAL_FRAMES}"
-                )
-        train, valid = e2vid.write_training_set(
-            sequences, folder, output, how, told["doubts"].append
-        )
-        told.update(train=train, valid=valid)
-        return len(train) + len(valid)
-
-    return write
-
-
-Write = Callable[[list[Sequence], Path, dict[str, Any]], int]
-"""Is given the recordings, the folder, and what is told of them; returns how many items."""
-
-
-def _exported(
-    paths: Many[str | Path],
-    output: str | Path,
-    described: dict[str, Any],
-    what: str,
-    write: Write,
-    *,
-    overwrite: bool = False,
-    doubt: Callable[[str], None] = lambda text: None,
-    side: str | Path | None = None,
-    **reading: Any,
-) -> Exported:
-    """Let `write` fill a folder, which comes into place when all is there.
-
-    Parameters
-    ----------
-    paths : sequence of str or Path
-        Event files or recordings, measured or simulated.
-    output : str or Path
-        Folder to write.
-    described : dict
-        What ``export.json`` says of the settings.
-    what : str
-        What the items are, for people.
-    write : callable
-        Fills the folder.
-    overwrite : bool
-        Replace, at the end, an export that exists.
-    doubt : callable
-        Takes lines for people that ask for a look.
-    side : str or Path, optional
-        Where side data are, in place of the recordings; "none": none are written.
-    **reading
-        See :func:`adv2e.formats.reading.open_events`.
-    """
-    began = time.perf_counter()
-    sequences = open_sequences(paths, side=side, **reading)
-    told: dict[str, Any] = {"sequences": [], "doubts": []}
-    read = [one for sequence in sequences for one in sequence.file.inputs]
-    with Staging(overwrite, read) as staging, writing(output):
-        folder = staging.folder(Path(output), foreign)
-        staging.prepare()
-        folder.mkdir()
-        items = write(sequences, folder, told)
-        for sequence in sequences:
-            _write_side(sequence, folder / "side" / sequence.name)
-            told["doubts"] += sequence.told
-        doubts = told.pop("doubts")
-        entries = sorted([entry.name for entry in folder.iterdir()] + [DESCRIPTION])
-        inputs = [
-            {
-                "name": sequence.name,
-                "file": shown(sequence.file.facts.path.name),
-                "label": report_of(sequence.file.facts.description, sequence.file.facts.problems),
-            }
-            for sequence in sequences
-        ]
-        asked = {name: reading.get(name) for name in ("start_s", "stop_s", "crop")}
-        part = {name: value for name, value in asked.items() if value is not None}
-        described |= {"part": part} if part else {}
-        text = {"adv2e": __version__, **described, "inputs": inputs, **told, "entries": entries}
-        (folder / DESCRIPTION).write_text(json.dumps(text, indent=2) + "\n", "utf-8", newline="\n")
+def _write_units(
+    to: str,
+    sequences: list[Sequence],
+    folder: Path,
+    how: Mapping[str, Any],
+    told: dict[str, Any],
+    of_tree: bool,
+) -> int:
+    """Write recordings, each to its place; with lists, of a tree or of a set; return how many."""
+    layout, rows = LAYOUTS[to], []
     for sequence in sequences:
-        doubts += [
-            f"{sequence.file.facts.path}: {problem}"
-            for problem in dict.fromkeys(sequence.file.facts.problems)
-        ]
-    for line in doubts:
-        doubt(line)
-    return Exported(str(output), len(sequences), items, what, time.perf_counter() - began)
+        place, label, split = layout.place_of(sequence.name, how["valid"])
+        rows.append((str(place), label, split))
+    check_once([row[0] for row in rows])
+    for sequence, (where, *_) in zip(sequences, rows, strict=True):
+        size, items = layout.write(sequence, folder / where, how, told["doubts"].append)
+        told["sequences"].append({"name": sequence.name, "size": list(size), "items": items})
+    if of_tree or layout.place != "{name}":
+        (folder / FILES).write_text(list_of(rows), "utf-8", newline="")
+    return sum(entry["items"] for entry in told["sequences"])
+
+
+def list_of(rows: Iterable[tuple[str, str, str]]) -> str:
+    """Return a list of files or folders, their classes, and parts of the set that they are in."""
+    text = io.StringIO()
+    lines = csv.writer(text, lineterminator="\n")
+    lines.writerows([("file", "class", "split"), *sorted(rows)])
+    return text.getvalue()
+
+
+def _write_ev_segnet(
+    sequences: list[Sequence], folder: Path, how: Mapping[str, Any], told: dict[str, Any]
+) -> int:
+    check_once([sequence.flat for sequence in sequences])
+    for sequence in sequences:
+        size, _, parts = events_in_order(sequence.file)
+        slices = before_images(parts, sequence.image_times_us, how["window_us"])
+        images = (image for _, image in e2vid.images_of(sequence))
+        items = ev_segnet.write_event_images(sequence.flat, slices, images, size, folder, how)
+        told["sequences"].append({"name": sequence.name, "size": list(size), "items": items})
+    return sum(entry["items"] for entry in told["sequences"])
+
+
+def _write_e2vid(
+    sequences: list[Sequence],
+    folder: Path,
+    final: Path,
+    how: Mapping[str, Any],
+    told: dict[str, Any],
+) -> int:
+    for sequence in sequences:
+        number = len(sequence.image_times_us)
+        if number < e2vid.USUAL_FRAMES:
+            told["doubts"].append(
+                f"{sequence.file.facts.path}: {number} images; a loader of 40 intervals, as"
+                f" event_cnn_minimal has it, needs {e2vid.USUAL_FRAMES}"
+            )
+    train, valid = e2vid.write_training_set(sequences, folder, final, how, told["doubts"].append)
+    told.update(train=train, valid=valid)
+    return len(train) + len(valid)
 
 
 def _write_side(sequence: Sequence, folder: Path) -> None:

@@ -47,9 +47,10 @@ from adv2e.events import Events
 from adv2e.exporting.e2vid import images_of
 from adv2e.exporting.sequence import Sequence
 from adv2e.exporting.targets import Targets
-from adv2e.exporting.voxels import in_windows, save_picture
+from adv2e.exporting.voxels import in_windows
 from adv2e.formats.reading import events_in_order
 from adv2e.formats.writing import open_sink
+from adv2e.light.pictures import png_of
 from adv2e.representations.histogram import stacked_histogram
 
 Made = tuple[tuple[int, int], int]
@@ -220,7 +221,7 @@ def write_dsec(sequence: Sequence, folder: Path, how: Mapping[str, Any], tell: T
         pictures = folder / "images" / "left" / "rectified"
         pictures.mkdir(parents=True)
         for number, (_, image) in enumerate(images_of(sequence)):
-            save_picture(pictures / f"{number:06d}.png", image)
+            (pictures / f"{number:06d}.png").write_bytes(png_of(image))
         _write_lines(folder / "images" / "timestamps.txt", times)
     if targets.flow:
         _write_dsec_flow(folder / "flow", targets)
@@ -240,8 +241,8 @@ def _write_dsec_flow(folder: Path, targets: Targets) -> None:
         held = np.rint(np.where(known, flow, 0) * _FLOW_STEPS + _FLOW_ZERO)
         known &= np.all((held >= 0) & (held < 1 << 16), axis=0)
         u, v = np.where(known, held, 0).astype(np.uint16)
-        picture = np.stack([known.astype(np.uint16), v, u], axis=2)  # the colours of OpenCV
-        save_picture(folder / "forward" / f"{number:06d}.png", picture)
+        picture = np.stack([u, v, known.astype(np.uint16)], axis=2)
+        (folder / "forward" / f"{number:06d}.png").write_bytes(png_of(picture))
     lines = [f"{start}, {stop}" for start, stop in targets.flow_us.tolist()]
     listing = folder / "forward_timestamps.txt"
     _write_lines(listing, ["# from_timestamp_us, to_timestamp_us", *lines])

@@ -16,6 +16,7 @@ from adv2e.exporting.folders import Made, Tell
 from adv2e.exporting.sequence import TEST, TRAIN, VALID, Sequence, in_class, is_held_out, split_of
 from adv2e.exporting.voxels import Save, Slice, saved
 from adv2e.formats.reading import events_in_order
+from adv2e.light.pictures import png_of
 from adv2e.options import EXPORTS, declared
 from adv2e.rendering.styles import STYLES, Style
 from adv2e.representations.histogram import stacked_histogram
@@ -113,7 +114,7 @@ def _pictures(how: Mapping[str, Any], size: Size) -> Save:
     def save(path: Path, part: Slice) -> None:
         style = Style(name=how["style"], window_us=max(1, part.stop_us - part.start_us))
         picture: NDArray[Any] = STYLES[style.name](part.events, *size, part.stop_us, style)
-        voxels.save_picture(path.with_name(f"{path.name}.png"), picture[..., ::-1])
+        path.with_name(f"{path.name}.png").write_bytes(png_of(picture))
 
     return save
 

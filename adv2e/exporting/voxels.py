@@ -23,7 +23,6 @@ from itertools import count, pairwise
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -121,13 +120,6 @@ class WindowFiles:
 def saved(path: Path, array: NDArray[Any]) -> None:
     """Write an array, with the suffix that it has."""
     np.save(path.with_name(f"{path.name}.npy"), array, allow_pickle=False)
-
-
-def save_picture(path: Path, picture: NDArray[Any]) -> None:
-    """Write a PNG, its colours in the order of OpenCV."""
-    done, data = cv2.imencode(".png", picture)
-    assert done
-    path.write_bytes(data.tobytes())
 
 
 # ---- Streams of events, cut into the windows of which networks are given a picture each.

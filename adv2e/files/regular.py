@@ -9,6 +9,8 @@ from __future__ import annotations
 import os
 import re
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -16,6 +18,15 @@ from adv2e.errors import Adv2eError, DataError
 
 _LONGEST = 64 << 20
 """Most text that is read from a descriptor [bytes]."""
+
+
+@contextmanager
+def reading(name: str | Path, kind: type[Adv2eError] = DataError) -> Iterator[None]:
+    """Turn an OSError in the body into an error of that kind with the name."""
+    try:
+        yield
+    except OSError as error:
+        raise kind(f"{name}: {error.strerror or error}") from error
 
 
 def check_ends(path: Path, kind: type[Adv2eError] = DataError) -> None:

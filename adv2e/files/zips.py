@@ -23,7 +23,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from adv2e.errors import DataError
-from adv2e.files.regular import check_expansion
+from adv2e.files.regular import check_expansion, reading
 from adv2e.process.machine import machine_complaint
 
 _UNREADABLE = (
@@ -162,11 +162,8 @@ class Members:
 
     def read(self, name: str) -> bytes:
         """Return the bytes of a file; DataError if it cannot be read."""
-        try:
-            with self.open(name) as file:
-                return file.read()
-        except OSError as error:
-            raise DataError(f"{self.label(name)}: {error.strerror or error}") from error
+        with reading(self.label(name)), self.open(name) as file:
+            return file.read()
 
 
 # ---- Arrays in the ``.npy`` format, of which no more is believed than is there.

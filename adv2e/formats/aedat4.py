@@ -52,7 +52,8 @@ from adv2e.events import EVENT_DTYPE, Events
 from adv2e.files.backlog import Backlog
 from adv2e.files.regular import expand
 from adv2e.formats.clock import shots_in_order
-from adv2e.formats.event_file import Columns, EventFile, Facts, described_geometry, joined
+from adv2e.formats.columns import named_geometry
+from adv2e.formats.event_file import Columns, EventFile, Facts, joined
 from adv2e.formats.writing import Pieces, Request, Writer, to_line
 from adv2e.label import left_out
 from adv2e.light.pictures import eight_bit
@@ -326,17 +327,14 @@ def _streams(path: Path, text: bytes) -> Iterator[_Stream]:
         root = ElementTree.fromstring(text)
         for node in root.iterfind("./node[@name='outInfo']/node"):
             attributes = {attr.get("key"): attr.text or "" for attr in node.iter("attr")}
-            sides = {
-                side: int(attributes[key])
-                for side, key in (("width", "sizeX"), ("height", "sizeY"))
-                if key in attributes
-            }
+            pairs = (("width", "sizeX"), ("height", "sizeY"))
+            sides = {side: int(attributes[key]) for side, key in pairs if key in attributes}
             yield _Stream(
                 int(node.get("name", "")),
                 attributes.get("typeIdentifier", ""),
                 attributes.get("source", ""),
                 attributes.get("originalOutputName", ""),
-                described_geometry(dict(sides)),
+                named_geometry(sides)[1],
                 attributes.get("adv2e", ""),
             )
     except (ElementTree.ParseError, ValueError) as error:

@@ -347,10 +347,9 @@ def open_bag(path: Path, facts: Facts) -> EventFile:
     """
     bag = _Bag(path, facts)
     facts.inputs += (file for kind in ("*.yaml", "*.db3*", "*.mcap*") for file in path.glob(kind))
-    facts.stated_unit = "us"
     if bag.settings:
         facts.describe(bag.settings, f"{path}: adv2e", "the file")
-        facts.stated_unit = "us"
+    facts.stated_unit = "us"
     first = next(bag.events(), None)
     if first is not None:
         facts.state(_size(first.size), "its first message of events")

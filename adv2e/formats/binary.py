@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from adv2e.background import OrderedWork
 from adv2e.errors import DataError
 from adv2e.events import Events
-from adv2e.formats.event_file import Column, Columns, EventFile, Facts, described_geometry
+from adv2e.formats.event_file import Column, Columns, EventFile, Facts
 from adv2e.formats.writing import Request, Writer, to_line
 from adv2e.label import left_out
 from adv2e.ticks import US, check_time
@@ -210,8 +210,7 @@ class Header:
         """Hand the description in the header to `facts`, and the geometry, (width, height)."""
         if "adv2e" in self.values:
             facts.describe(self.values["adv2e"], f"{self.path}: header: adv2e", "the header")
-        sizes = {"width": geometry[0], "height": geometry[1]}
-        facts.state(described_geometry(sizes), "the header")
+        facts.state_by_names({"width": geometry[0], "height": geometry[1]}, "the header")
 
 
 def read_header(path: Path) -> Header:
@@ -317,7 +316,7 @@ def open_es(path: Path, facts: Facts) -> EventFile:
             " events"
         )
     width, height = (int(size) for size in np.frombuffer(header[16:20], "<u2"))
-    facts.state(described_geometry({"width": width, "height": height}), "the header")
+    facts.state_by_names({"width": width, "height": height}, "the header")
 
     def parts() -> Iterator[Columns]:
         total, t, rest = path.stat().st_size, 0, b""

@@ -39,7 +39,7 @@ from adv2e.causes import has_causes
 from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.formats.columns import find_columns, geometry_in, stated_unit, told_order
-from adv2e.formats.event_file import EventFile, Facts, described_geometry
+from adv2e.formats.event_file import EventFile, Facts
 from adv2e.formats.text import Form, events_of_lines
 from adv2e.formats.writing import Request, Writer
 from adv2e.label import guessed
@@ -78,7 +78,7 @@ def open_csv(path: Path, facts: Facts) -> EventFile:
     size = re.search(rb"%geometry:(\d{1,5}),(\d{1,5})\s|x@(\d{1,5})\W+y@(\d{1,5})", begin[:skipped])
     if size is not None:
         width, height = (int(side) for side in size.groups() if side is not None)
-        facts.state(described_geometry({"width": width, "height": height}), "its heading")
+        facts.state_by_names({"width": width, "height": height}, "its heading")
     # of what was written here, the description beside it tells: t is in us
     facts.stated_unit = "us" if facts.description and found[0] == "t" else None
     facts.time_unit = facts.time_unit or stated_unit(found[0])

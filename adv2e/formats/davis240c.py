@@ -37,7 +37,6 @@ from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,10 +50,11 @@ from adv2e.files.zips import Members
 from adv2e.formats.event_file import EventFile, Facts
 from adv2e.formats.text import lines_of
 from adv2e.formats.text_writer import blocks_of, formatted, text_blocks
-from adv2e.formats.writing import Request, Writer, listed_side, to_json, write_side
+from adv2e.formats.writing import Pieces, Request, Writer, listed_side, to_json, write_side
 from adv2e.label import told_of
-from adv2e.sources.frame import Frame, Shot
-from adv2e.sources.images.opencv import decode_image
+from adv2e.light.pictures import png_of
+from adv2e.sources.frame import Shot
+from adv2e.sources.images.opencv import image_of
 from adv2e.sources.stored import DESCRIPTION, EVENTS, LIST
 from adv2e.sources.times.lists import FrameList, decoded, has_lines, members_of, parse_list
 from adv2e.sources.times.rates import nine_decimals
@@ -93,7 +93,7 @@ def open_davis240c(path: Path, facts: Facts) -> EventFile:
         facts.note_frames(listed.unit, whole=listed.whole)
     if facts.geometry is None and listed is not None:
         first = members_of(listed.stamps[:1], files.label(LIST), files.has)[0]
-        rows, columns = decode_image(files.read(first), files.label(first)).image.shape[:2]
+        rows, columns = image_of(files, first).image.shape[:2]
         facts.state((columns, rows), first)
     label = files.label(name)
     header = f"the first line of {name}"
@@ -105,14 +105,10 @@ def open_davis240c(path: Path, facts: Facts) -> EventFile:
     facts.problems += [told_of(LIST, line) for line in (listed.unit.doubt, listed.order) if line]
     names = members_of(listed.stamps, files.label(LIST), files.has)
     shots = [
-        Shot(stamp.t_ns, files.label(member), partial(_image, files, member))
+        Shot(stamp.t_ns, files.label(member), partial(image_of, files, member))
         for stamp, member in zip(listed.stamps, names, strict=True)
     ]
     return replace(text_file, layout="davis240c", shots=lambda: iter(shots))
-
-
-def _image(files: Members, name: str) -> Frame:
-    return decode_image(files.read(name), files.label(name))
 
 
 def _listed(files: Members, **evidence: Any) -> FrameList | None:
@@ -125,12 +121,6 @@ def _listed(files: Members, **evidence: Any) -> FrameList | None:
 
 _BLOCK = 1 << 20  # bytes of text deflated at once: the archive must not depend on who calls how
 _LEVEL = 4  # of deflate: a fifth more bytes than level 6, in a third of its time
-
-
-def _png(image: NDArray[Any]) -> bytes:
-    done, data = cv2.imencode(".png", image)
-    assert done
-    return data.tobytes()
 
 
 class _Davis240cWriter(Writer):
@@ -146,8 +136,7 @@ class _Davis240cWriter(Writer):
         """Append a frame."""
         name = f"images/frame_{len(self._lines):08d}.png"
         self._lines.append(f"{nine_decimals(t_ns)} {name}\n")
-        ordered = image[..., ::-1] if image.ndim == 3 else image  # the colours of OpenCV
-        self._store_frame(name, t_ns, np.array(ordered))
+        self._store_frame(name, t_ns, image.copy())
 
     @abstractmethod
     def _store_frame(self, name: str, t_ns: int, image: NDArray[Any]) -> None:
@@ -176,7 +165,7 @@ class FolderWriter(_Davis240cWriter):
             self._work.submit(formatted, block, take=self._events.write)
 
     def _store_frame(self, name: str, t_ns: int, image: NDArray[Any]) -> None:
-        self._work.submit(_png, image, take=(self._folder / name).write_bytes)
+        self._work.submit(png_of, image, take=(self._folder / name).write_bytes)
 
     def finish(self) -> None:
         """Write the remaining frames, the list and the description."""
@@ -213,29 +202,24 @@ class ZipWriter(_Davis240cWriter):
         self._events = stack.enter_context(self._archive.open(EVENTS, "w", force_zip64=True))
         self._deflating = OrderedWork(min(1, request.threads - 1))
         stack.callback(self._deflating.abandon)
-        self._text = bytearray()
+        self._text = Pieces(_BLOCK, np.uint8)
         self._encoded = stack.enter_context(closing(Backlog(path.parent, limit=0)))
 
     def write_events(self, events: Events) -> None:
         """Append events."""
         for block in text_blocks(events):
-            self._text += block
-            while len(self._text) >= _BLOCK:
-                self._deflate(self._text[:_BLOCK])
-                del self._text[:_BLOCK]
-
-    def _deflate(self, text: bytearray) -> None:
-        self._deflating.submit(self._events.write, text)
+            for piece in self._text.add(np.frombuffer(block, np.uint8)):
+                self._deflating.submit(self._events.write, piece.data)
 
     def _store_frame(self, name: str, t_ns: int, image: NDArray[Any]) -> None:
         def take(data: bytes) -> None:
             self._encoded.append(t_ns, np.frombuffer(data, np.uint8))
 
-        self._work.submit(_png, image, take=take)
+        self._work.submit(png_of, image, take=take)
 
     def finish(self) -> None:
         """Write the remaining events, the list, the frames and the description."""
-        self._deflate(self._text)
+        self._deflating.submit(self._events.write, self._text.take().data)
         self._deflating.finish()
         self._events.close()
         self._archive.getinfo(EVENTS).external_attr = 0o644 << 16
@@ -268,16 +252,18 @@ class E2vidWriter(Writer):
             self._file = stack.enter_context(archive.open(name, "w", force_zip64=True))
         else:
             self._file = stack.enter_context(path.open("wb"))
-        self._text = bytearray(f"{request.width} {request.height}\n".encode())
+        self._text = Pieces(_BLOCK, np.uint8)
+        self._write(f"{request.width} {request.height}\n".encode())
 
     def write_events(self, events: Events) -> None:
         """Append events."""
         for block in text_blocks(events):
-            self._text += block
-            while len(self._text) >= _BLOCK:
-                self._file.write(self._text[:_BLOCK])
-                del self._text[:_BLOCK]
+            self._write(block)
+
+    def _write(self, text: bytes | memoryview) -> None:
+        for piece in self._text.add(np.frombuffer(text, np.uint8)):
+            self._file.write(piece.data)
 
     def finish(self) -> None:
         """Write the remaining lines."""
-        self._file.write(self._text)
+        self._file.write(self._text.take().data)

@@ -297,8 +297,3 @@ def joined(parts: Callable[[], Iterator[Columns]]) -> Iterator[Columns]:
 def _concatenated(held: list[Columns]) -> Columns:
     t, x, y, p = (np.concatenate(columns) for columns in zip(*held, strict=True))
     return t, x, y, p
-
-
-def described_geometry(description: Mapping[str, Any]) -> tuple[int, int] | None:
-    """Return (width, height) [pixels] that a description holds, or None."""
-    return named_geometry(description)[1]

@@ -170,9 +170,7 @@ def shots_of(file: EventFile, shots: Iterable[Shot] | None = None) -> Iterator[S
 def _loaded(facts: Facts, shot: Shot) -> Frame:
     with _reading(facts.path):
         frame = shot.load()
-    size, crop = Size(*frame.image.shape[1::-1]), facts.selection.crop
-    if crop is not None and not crop.is_inside(*size):
-        raise DataError(f"{shot.label}: --crop {crop} is not inside its {size} pixels")
+    facts.selection.check_crop(Size(*frame.image.shape[1::-1]), shot.label)
     return facts.selection.of_frame(frame)
 
 

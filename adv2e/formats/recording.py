@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import compress
 from pathlib import Path
 from typing import Any
@@ -108,9 +107,13 @@ class Recording:
             return replace(self, events=events)
         at_us = microseconds(self.frame_times_ns)
         inside = (start <= at_us) & (at_us < stop)
-        images = partial(_chosen, self.images, inside.tolist())
-        times_ns = self.frame_times_ns[inside]
-        return replace(self, events=events, frame_times_ns=times_ns, images=images)
+        times_ns, whole = self.frame_times_ns[inside], self.images
+        return replace(
+            self,
+            events=events,
+            frame_times_ns=times_ns,
+            images=lambda: compress(whole(), inside.tolist()),
+        )
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the events to a file; see :func:`adv2e.write_events`."""
@@ -140,14 +143,13 @@ class Recording:
         from base64 import b64encode  # noqa: PLC0415 - all these are for notebooks alone
         from html import escape  # noqa: PLC0415
 
-        import cv2  # noqa: PLC0415
-
         from adv2e import render  # noqa: PLC0415 - which is above this module
+        from adv2e.light.pictures import png_of  # noqa: PLC0415
 
         parts = [f"<p>{escape(repr(self))}</p>"]
         for style in ("white", "rate") if self.events.size and self.width and self.height else ():
             picture: Any = render(self, count=1, frames=False, style=style)
-            data = b64encode(cv2.imencode(".png", picture[:, :, ::-1])[1].tobytes()).decode()
+            data = b64encode(png_of(picture)).decode()
             words = "events" if style == "white" else "rate of events over time"
             parts.append(f'<img alt="{words}" src="data:image/png;base64,{data}"/>')
         return "<br>".join(parts)
@@ -198,9 +200,3 @@ class Recording:
             odd = "" if stored is not None else odd_white(frame, first)
             label = f"{self.path}: frame {number}"
             yield replace(frame, t_ns=t_ns, label=label, white=stored or first, odd_white=odd)
-
-
-def _chosen(
-    images: Callable[[], Iterator[Image | Frame]], inside: list[bool]
-) -> Iterator[Image | Frame]:
-    return compress(images(), inside)

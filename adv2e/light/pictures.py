@@ -10,6 +10,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+import cv2
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
@@ -53,6 +54,14 @@ def picture_of(
     if fitting is not None:
         return stored.encode(map(fitting.plane, decoder.shares(image, alpha)))
     return picture if alpha is None else stored.over_black(picture, alpha)
+
+
+def png_of(picture: NDArray[Any]) -> bytes:
+    """Return a picture, grey or RGB, as PNG."""
+    ordered = picture[..., ::-1] if picture.ndim == 3 else picture  # the colours of OpenCV
+    done, data = cv2.imencode(".png", ordered)
+    assert done
+    return data.tobytes()
 
 
 @lru_cache(maxsize=4)

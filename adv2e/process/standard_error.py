@@ -12,9 +12,10 @@ import io
 import os
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import BinaryIO, cast
+from typing import Any, BinaryIO, cast
 
 _descriptor = 2
 _heard = -1
@@ -52,6 +53,36 @@ def _nameless_file() -> int:
     with suppress(OSError), tempfile.TemporaryFile(buffering=0) as file:
         return os.dup(file.fileno())
     return os.open(os.devnull, os.O_RDWR)
+
+
+class Shared:
+    """Context of a setting that is of the whole process: the last thread to leave puts it back.
+
+    Parameters
+    ----------
+    begin : callable
+        Changes the setting, and returns what it was.
+    end : callable
+        Is given what it was.
+    """
+
+    def __init__(self, begin: Callable[[], Any], end: Callable[[Any], object]) -> None:
+        self._begin, self._end = begin, end
+        self._lock = threading.Lock()
+        self._inside = 0
+        self._before: Any = None
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._inside == 0:
+                self._before = self._begin()
+            self._inside += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                self._end(self._before)
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from adv2e.errors import UsageError
 from adv2e.events import checked_events
 from adv2e.formats.reading import Recording, read_events
 from adv2e.options import EventInput, RenderedPart, RenderOptions, chosen, size_of, takes
+from adv2e.process.bars import reading_bar
 from adv2e.rendering.films import check_suffix
 from adv2e.rendering.recording import render_recording
 from adv2e.rendering.styles import RATE, Style, parse_colour
@@ -30,7 +32,8 @@ def render(
     events: str | Path | Recording | NDArray[Any],
     output: str | Path | None = None,
     *,
-    frames: bool = True,
+    frames: bool | None = None,
+    doubt: Callable[[str], None] = lambda text: None,
     **options: Unpack[RenderOptions],
 ) -> NDArray[np.uint8] | None:
     """Draw a film (.mp4, .webm, .avi, .gif) or a sheet of pictures (.png) of events.
@@ -41,8 +44,10 @@ def render(
         A file, what :func:`adv2e.read_events` returned, or the events themselves.
     output : str or Path, optional
         File to write; its suffix says what to make.  Without one, a sheet is returned.
-    frames : bool
-        Show the frames beside the events, where there are any.
+    frames : bool, optional
+        Show the frames beside the events.  Default: where there are any.
+    doubt : callable
+        Takes lines for people on what is doubtful in a file.
     **options
         See :class:`adv2e.options.RenderOptions`.  An array needs `size`; how to read a file is for
         files alone.
@@ -80,14 +85,14 @@ def render(
         if path is None:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="adv2e-render-"))
             path = Path(folder) / "events.png"
-        recording = recording_of(events, reading_of(options))
-        render_recording(
-            recording,
-            path,
-            style=chosen_style(path, options),
-            frames=frames,
-            **chosen(RenderedPart, options),
-        )
+        style = chosen_style(path, options)
+        recording = recording_of(events, reading_of(options), progress=options["progress"])
+        for problem in recording.problems:
+            doubt(f"{recording.path}: {problem}")
+        if frames and recording.frame_times_ns is None:
+            doubt(f"{recording.path}: holds no frames to show beside the events")
+        shown = chosen(RenderedPart, options)
+        render_recording(recording, path, style=style, frames=frames is not False, **shown)
         if output is not None:
             return None
         picture: Any = cv2.imread(str(path))
@@ -120,10 +125,13 @@ def chosen_style(output: str | Path, options: RenderOptions) -> Style:
     )
 
 
-def recording_of(events: str | Path | Recording | NDArray[Any], reading: EventInput) -> Recording:
+def recording_of(
+    events: str | Path | Recording | NDArray[Any], reading: EventInput, *, progress: bool = False
+) -> Recording:
     """Return the recording to draw; UsageError if options do not fit what it is made of."""
     if isinstance(events, (str, Path)):
-        return read_events(events, **reading)
+        with reading_bar(events, progress) as told:
+            return read_events(events, progress=told, **reading)
     is_array = isinstance(events, np.ndarray)
     for name, value in reading.items():
         if value and not (is_array and name == "size"):

@@ -22,12 +22,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.files.backlog import Backlog
+from adv2e.light.pictures import png_of
 from adv2e.side.placement import Clock
 from adv2e.sources.times.rates import nine_decimals
 
@@ -62,9 +62,7 @@ class BlurredFrames:
             if self._number % self._count == 0:
                 length = t_ns - self._start_ns
                 made = self._decoder.encode(total / length for total in self._sums)
-                done, data = cv2.imencode(".png", made[..., ::-1] if made.ndim == 3 else made)
-                assert done
-                self._kept.append(t_ns, data)
+                self._kept.append(t_ns, np.frombuffer(png_of(made), np.uint8))
                 self._sums, self._start_ns = [np.zeros(one.shape) for one in light], t_ns
         self._before, self._number = (t_ns, light), self._number + 1
 

@@ -41,6 +41,7 @@ from adv2e.files.zips import read_array
 from adv2e.geometry import Size
 from adv2e.side.placement import Clock, Placement
 from adv2e.side.tables import unit_of
+from adv2e.sources.images.headers import png_chunks
 from adv2e.sources.times.rates import NUMBER, nine_decimals, parse_ns
 
 SUFFIXES = (".png", ".npy", ".flo")
@@ -233,11 +234,11 @@ def _palette(data: bytes) -> bytes:
     """Return the palette of a PNG; empty where it has none."""
     if data[:8] != _PNG or data[_COLOUR : _COLOUR + 1] != _INDEXED:
         return b""
-    return next((body for kind, body in _chunks(data) if kind == b"PLTE"), b"")
+    return next((body for kind, body in png_chunks(data) if kind == b"PLTE"), b"")
 
 
 def _indices(data: bytes, label: str) -> NDArray[Any]:
-    kept = (pair for pair in _chunks(data) if pair[0] in (b"IHDR", b"IDAT", b"IEND"))
+    kept = (pair for pair in png_chunks(data) if pair[0] in (b"IHDR", b"IDAT", b"IEND"))
     grey = _joined(kept, _GREY)
     image = cv2.imdecode(np.frombuffer(grey, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:
@@ -246,16 +247,8 @@ def _indices(data: bytes, label: str) -> NDArray[Any]:
 
 
 def _with_palette(grey: bytes, palette: bytes) -> bytes:
-    head, *rest = _chunks(grey)
+    head, *rest = png_chunks(grey)
     return _joined([head, (b"PLTE", palette), *rest], _INDEXED)
-
-
-def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    at = len(_PNG)
-    while at + 12 <= len(data):
-        (size,) = struct.unpack_from(">I", data, at)
-        yield data[at + 4 : at + 8], data[at + 8 : at + 8 + size]
-        at += 12 + size
 
 
 def _joined(chunks: Iterable[tuple[bytes, bytes]], colour: bytes) -> bytes:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from adv2e.errors import DataError, UsageError
-from adv2e.files.regular import check_ends
+from adv2e.files.regular import check_ends, reading
 from adv2e.options import SourceOptions, size_of, takes
 from adv2e.sources.base import GivenTimes, Selection, Source
 from adv2e.sources.frame import Frame
@@ -94,12 +94,10 @@ def open_source(path: str | Path, **options: Unpack[SourceOptions]) -> Source:
             raise UsageError("--motion moves before one picture: INPUT must be its file")
         from adv2e.sources import live  # noqa: PLC0415  (needs PyAV)
 
-        return live.open_source(str(path), given, selection, is_camera=is_camera)
+        return live.LiveSource(str(path), given, selection, is_camera)
     named, path = str(path), Path(path)
-    try:
+    with reading(named):
         check_ends(path)
-    except OSError as error:
-        raise DataError(f"{named}: {error.strerror or error}") from error
     if not path.exists():
         raise DataError(f"{named}: no such file or folder{_advice(named)}")
     if along is not None:

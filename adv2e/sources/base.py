@@ -40,6 +40,7 @@ from adv2e.sources.frame import (
     rotated180,
 )
 from adv2e.sources.paths import SensorPath
+from adv2e.sources.times.lists import read_list
 from adv2e.sources.times.rates import NS_PER_S, FrameRate, Rate, parse_rate, seconds
 from adv2e.ticks import check_time
 
@@ -142,12 +143,8 @@ class Source(ABC):
         self.height, self.width = image.shape[:2]
         self.whole = Size(self.width, self.height)
         check_pixels(*self.whole, label)
-        crop = self.selection.crop
-        if crop is not None:
-            if not crop.is_inside(*self.whole):
-                raise DataError(
-                    f"{label}: --crop {crop} is not inside its {self.width}x{self.height} pixels"
-                )
+        self.selection.check_crop(self.whole, label)
+        if (crop := self.selection.crop) is not None:
             self.width, self.height = crop.width, crop.height
         self.dtype = image.dtype
         self.colour = image.ndim == 3
@@ -170,6 +167,27 @@ class Source(ABC):
     def listed(self) -> Sequence[Shot]:
         """Return all frames, in the order of time, where they are known before; else none."""
         return ()
+
+    def _take_list(self, given: GivenTimes, own_step_s: float | None = None) -> list[int]:
+        """Return the times [ns] of the list that is given, of which doubts and notes are taken.
+
+        Raises
+        ------
+        DataError
+            It cannot be read, or has exposures: sources that are no pictures do not take these.
+        """
+        assert given.timestamps is not None
+        label, unit = str(given.timestamps), given.time_unit
+        found = read_list(given.timestamps, time_unit=unit, own_step_s=own_step_s)
+        if any(stamp.exposure_ns for stamp in found.stamps):
+            raise DataError(
+                f"{label}: exposures, with start and end, are for pictures and stacks: make a"
+                " folder of pictures of these frames, or a list of their middles"
+            )
+        doubts, notes = found.told(label)
+        self.doubts += doubts
+        self.notes += notes
+        return [stamp.t_ns for stamp in found.stamps]
 
     def own_times_ns(self) -> list[int] | None:
         """Return the times of the frames that a rate replaces [ns]; None: there are none.
@@ -405,6 +423,11 @@ class Selection:
         ends = {"before": self.start_s, "after": self.stop_s}
         told = [f"{side} {end:g} s" for side, end in ends.items() if end is not None]
         return [left_out(f"what is {' and '.join(told)} from the begin")] if told else []
+
+    def check_crop(self, size: Size, label: str) -> None:
+        """Raise DataError if the part that is wanted is not inside a frame of that size."""
+        if self.crop is not None and not self.crop.is_inside(*size):
+            raise DataError(f"{label}: --crop {self.crop} is not inside its {size} pixels")
 
     def of_frame(self, frame: Frame) -> Frame:
         """Return the selected part of a frame, upright, without the rest in memory."""

@@ -31,8 +31,8 @@ from adv2e.errors import DataError
 from adv2e.files.zips import Members
 from adv2e.label import guessed, told_of
 from adv2e.sources.base import GivenTimes, Selection
-from adv2e.sources.frame import Frame, Light
-from adv2e.sources.images.opencv import IMAGE_SUFFIXES, decode_image
+from adv2e.sources.frame import Light
+from adv2e.sources.images.opencv import IMAGE_SUFFIXES, image_of
 from adv2e.sources.listed import ListedSource, Picture, timed
 from adv2e.sources.times.lists import decoded, first_name, member_of, members_of, parse_list
 
@@ -65,7 +65,10 @@ def find_listing(files: Members) -> Listing | None:
     """Return the list that a folder or zip has, if there is the image that it names first."""
     for known in _KNOWN:
         try:
-            if not files.has(known.place) or not (name := _first_name(files, known)):
+            label = files.label(known.place)
+            if not files.has(known.place):
+                continue
+            if not (name := first_name(decoded(files.read(known.place), label), label)):
                 continue
         except DataError:  # another table under this name
             continue
@@ -129,17 +132,12 @@ def listed_source(
     where = f" in {path}" if path.is_dir() else " in the zip"
     members = members_of(found.stamps, label, partial(_has, files, folder), where=where)
     places = [str(folder / member) for member in members]
-    pictures = [Picture(files.label(m), m, partial(_read_image, files, m)) for m in places]
+    pictures = [Picture(files.label(m), m, partial(image_of, files, m)) for m in places]
     # in their order: which picture a name means is settled
     unnamed = replace(found, stamps=[replace(stamp, name=None) for stamp in found.stamps])
     times = timed(given, pictures, path, label, lambda _: unnamed)
     has_clock = given.fps is None
     return ListedSource(path, listing.kind, times, selection, has_clock=has_clock, light=light)
-
-
-def _first_name(files: Members, listing: Listing) -> str:
-    label = files.label(listing.place)
-    return first_name(decoded(files.read(listing.place), label), label)
 
 
 def _folder(files: Members, listing: Listing, name: str) -> PurePosixPath:
@@ -151,7 +149,3 @@ def _folder(files: Members, listing: Listing, name: str) -> PurePosixPath:
 
 def _has(files: Members, folder: PurePosixPath, member: str) -> bool:
     return files.has(str(folder / member))
-
-
-def _read_image(files: Members, member: str) -> Frame:
-    return decode_image(files.read(member), files.label(member))

@@ -45,13 +45,6 @@ def device(name: str) -> tuple[str, str]:
     return "v4l2", name if name.startswith("/") else f"/dev/video{name}"
 
 
-def open_source(
-    name: str, given: GivenTimes, selection: Selection, *, is_camera: bool
-) -> LiveSource:
-    """Return the frames of a camera, or of an address."""
-    return LiveSource(name, given, selection, is_camera)
-
-
 class LiveSource(Source):
     """Frames that come until they are ended; DataError if none do, or not as they should.
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from adv2e.effects.frames.encoding import full_scale_of
 from adv2e.errors import DataError
+from adv2e.files.regular import reading
 from adv2e.files.zips import Header, read_array, read_header
 from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.frame import Frame, check_pixels
@@ -57,11 +58,8 @@ def timed_beside(path: Path, given: GivenTimes, pictures: Sequence[Picture]) -> 
 
 
 def _open_stack(path: Path) -> _Stack:
-    try:
-        with path.open("rb") as file:
-            header = read_header(file, os.fstat(file.fileno()).st_size, str(path))
-    except OSError as error:
-        raise DataError(f"{path}: {error.strerror or error}") from error
+    with reading(path), path.open("rb") as file:
+        header = read_header(file, os.fstat(file.fileno()).st_size, str(path))
     shape = header.shape
     if len(shape) not in (3, 4) or (len(shape) == 4 and shape[3] != 3) or 0 in shape[1:]:
         raise DataError(
@@ -91,7 +89,7 @@ class _Stack:
     def read(self, number: int) -> Frame:
         """Return a frame in the machine's byte order; DataError if it is not there."""
         header, label = self._header, f"{self._path}: frame {number}"
-        try:
+        with reading(label):
             if header.fortran:
                 if self._whole is None:
                     self._whole = _read_whole(self._path)
@@ -102,8 +100,6 @@ class _Stack:
                 image = np.fromfile(self._path, header.dtype, size, offset=begin)
                 if image.size < size:
                     raise DataError(f"{label}: cut short while it was read")
-        except OSError as error:
-            raise DataError(f"{label}: {error.strerror or error}") from error
         native = header.dtype.newbyteorder("=")
         return Frame(np.require(image.reshape(self._shape), native, ["C"]))
 
@@ -117,10 +113,8 @@ def _read_times(given: GivenTimes, name: str) -> FrameList:
     file = Path(name)
     if file.suffix != ".npy":
         return read_list(file, time_unit=given.time_unit)
-    try:
+    with reading(file):
         times = _read_whole(file)
-    except OSError as error:
-        raise DataError(f"{file}: {error.strerror or error}") from error
     if times.ndim != 1 or times.dtype.kind not in "iuf" or times.dtype.itemsize < 8:
         raise DataError(
             f"{file}: {times.dtype.name} of shape {times.shape}; expected float64 or int64, one"

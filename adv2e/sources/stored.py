@@ -13,6 +13,7 @@ from typing import Any
 
 from adv2e.effects.frames.encoding import check_encoding
 from adv2e.errors import ConfigError, DataError
+from adv2e.files.regular import reading
 from adv2e.sources.frame import RECORDED, Light
 
 EVENTS, LIST, DESCRIPTION = "events.txt", "images.txt", "adv2e.json"
@@ -94,9 +95,6 @@ def light_beside(file: Path) -> Light | None:
     """Return the encoding in a description beside frames; None if there is no such file."""
     if not file.is_file():
         return None
-    try:
-        with file.open("rb") as opened:
-            text = opened.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise DataError(f"{file}: {error.strerror}") from error
+    with reading(file), file.open("rb") as opened:
+        text = opened.read(MOST_BYTES + 1)
     return read_light(text, str(file))

@@ -13,8 +13,7 @@ from adv2e.files.zips import Members
 from adv2e.label import left_out
 from adv2e.sources import davis240c
 from adv2e.sources.base import GivenTimes, Selection
-from adv2e.sources.frame import Frame
-from adv2e.sources.images.opencv import IMAGE_SUFFIXES, decode_image
+from adv2e.sources.images.opencv import IMAGE_SUFFIXES, image_of
 from adv2e.sources.images.source import LISTS, in_order
 from adv2e.sources.listed import ListedSource, Picture, timed
 from adv2e.sources.listings import find_listing, open_listing
@@ -50,7 +49,7 @@ def open_source(path: Path, given: GivenTimes, selection: Selection) -> ListedSo
             f"{path}: images in more than one folder of it, {folders[0]} and {folders[1]}; make a"
             " zip of each"
         )
-    pictures = [Picture(files.label(n), n, partial(_read_image, files, n)) for n in images]
+    pictures = [Picture(files.label(n), n, partial(image_of, files, n)) for n in images]
     found = _found_list(PurePosixPath(folders[0]), files)
     label = None if found is None else files.label(found)
 
@@ -80,7 +79,3 @@ def _found_list(folder: PurePosixPath, files: Members) -> str | None:
     """Return the list in the folder of the images, or beside it; None: there is none."""
     places = [str(place / name) for place in (folder, folder.parent) for name in LISTS]
     return next(filter(files.has, places), None)
-
-
-def _read_image(files: Members, member: str) -> Frame:
-    return decode_image(files.read(member), files.label(member))

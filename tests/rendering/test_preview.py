@@ -10,8 +10,8 @@ from processes import running_python
 
 from adv2e.errors import OutputError, UsageError
 from adv2e.events import empty_events, make_events
-from adv2e.rendering import Style, open_preview
-from adv2e.rendering.styles import GAP
+from adv2e.rendering.recording import open_preview
+from adv2e.rendering.styles import GAP, Style
 
 EVENTS = make_events(np.arange(0, 1_000_000, 500), np.arange(2000) % 32, [0] * 2000, [1, 0] * 1000)
 

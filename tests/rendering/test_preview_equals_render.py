@@ -16,7 +16,8 @@ from adv2e.conversion.reading import Reading
 from adv2e.errors import OutputError
 from adv2e.events import empty_events, make_events
 from adv2e.formats.reading import Recording, read_events
-from adv2e.rendering import Style, open_preview, render_recording
+from adv2e.rendering.recording import open_preview, render_recording
+from adv2e.rendering.styles import Style
 from adv2e.rendering.timeline import Timeline
 from adv2e.synthetic import Scene
 from adv2e.synthetic.scene import write_video

@@ -7,7 +7,9 @@ import pytest
 from adv2e.errors import DataError
 from adv2e.events import empty_events, make_events
 from adv2e.formats.reading import Recording
-from adv2e.rendering import Style, films, render_recording, styles
+from adv2e.rendering import films, styles
+from adv2e.rendering.recording import render_recording
+from adv2e.rendering.styles import Style
 
 EPOCH = 1_470_000_000_000_000  # us
 

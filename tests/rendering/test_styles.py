@@ -7,7 +7,7 @@ import pytest
 
 from adv2e.errors import UsageError
 from adv2e.events import make_events
-from adv2e.rendering import Style, draw, parse_colour
+from adv2e.rendering.styles import Style, draw, parse_colour
 
 RED, BLUE = (255, 0, 0), (0, 0, 255)
 

@@ -16,10 +16,14 @@ References
 
 from __future__ import annotations
 
+import io
 import re
 import struct
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import takewhile
+from typing import IO, NamedTuple
 
 from adv2e.effects.frames.encoding import UNKNOWN
 from adv2e.errors import DataError
@@ -64,7 +68,9 @@ class Header:
     grey : bool
         OpenCV repeats grey three times.
     white : float, optional
-        Number that means white, where it is not that of the data type.
+        Number that means white in the image of OpenCV, where it is not that of the data type.
+    inverted : bool
+        Zero is white in the image of OpenCV.
     clear : int, optional
         Grey value of pixels that are not there, in the bits that OpenCV returns.
     encoding, says : str
@@ -79,6 +85,7 @@ class Header:
     alpha: Alpha = Alpha.STRAIGHT
     grey: bool = False
     white: float | None = None
+    inverted: bool = False
     clear: int | None = None
     encoding: str = ""
     says: str = ""
@@ -122,7 +129,8 @@ def check_size(width: int, height: int, data: bytes, label: str) -> None:
 def _png(data: bytes) -> Header:
     width, height, depth, colours = struct.unpack_from(">IIBB", data, 16)
     pictures, clear, densities, light = 1, None, (1, 1), {}
-    for kind, content in _png_chunks(data):
+    # those before the picture's data: all that say how it is to be read
+    for kind, content in takewhile(lambda chunk: chunk[0] != b"IDAT", png_chunks(data)):
         if kind == b"pHYs":
             densities = struct.unpack_from(">II", content)
         elif kind in _LIGHT:
@@ -166,15 +174,12 @@ def _light_of_png(chunks: dict[bytes, bytes]) -> tuple[str, str]:
     return "", ""
 
 
-def _png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Yield the chunks before the picture's data: all that say how it is to be read."""
+def png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Yield kind and content of the chunks of a PNG."""
     at = 8
     while at + 12 <= len(data):
         (size,) = struct.unpack_from(">I", data, at)
-        kind = data[at + 4 : at + 8]
-        if kind == b"IDAT":
-            return
-        yield kind, data[at + 8 : at + 8 + size]
+        yield data[at + 4 : at + 8], data[at + 8 : at + 8 + size]
         at += 12 + size
 
 
@@ -245,47 +250,106 @@ _REDUCED, _MASK = 1, 4
 _WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _LOG_L, _LOG_LUV = 0, 1, 2, 32844, 32845
 _ASSOCIATED, _UNASSOCIATED = 1, 2
 _TYPES = {1: "B", 2: "B", 3: "H", 4: "I", 16: "Q"}
+_SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 6: 1, 7: 1, 8: 2, 9: 4, 10: 8, 11: 4, 12: 8, 16: 8}
 _TEXT, _FLOAT = 2, 3
 _VALUES = 64
 _IMAGEJ = re.compile(rb"ImageJ=.*\nimages=([0-9]{1,9})\n")
 """Description of stacks of ImageJ that have all pages behind the first, with one directory."""
 
 
-@dataclass(frozen=True)
-class _Tag:
+class _Tag(NamedTuple):
     values: tuple[int, ...]
     at: int
     """Offset of its values in the file [bytes]."""
-
-
-@dataclass(frozen=True)
-class Tiff:
-    """Facts about a TIFF beside its pixels: white, inversion, alpha.
-
-    Attributes
-    ----------
-    data : bytes
-        The file, so that OpenCV leaves colours as they are.
-    white : float, optional
-        Number that means white in the image of OpenCV, where it is not that of the data type.
-    inverted : bool
-        Zero is white in the image of OpenCV.
-    alpha : Alpha
-        Meaning of a fourth channel.
-    """
-
-    data: bytes
-    white: float | None
-    inverted: bool
-    alpha: Alpha
 
 
 def is_tiff(data: bytes) -> bool:
     return data[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 
-def examine(data: bytes, label: str) -> Tiff | None:
-    """Return the facts in the first directory; None if it cannot be read.
+class Entry(NamedTuple):
+    """Type and number of values; the field that holds them, or where they are, and its offset."""
+
+    kind: int
+    length: int
+    field: bytes
+    at: int
+
+
+class Directories:
+    """The directories of a TIFF, read as they are asked for; DataError for what is not there.
+
+    Attributes
+    ----------
+    size : int
+        Of the file [bytes].
+    order, pointer, counter, entry : str
+        Byte order; forms of an offset, of a number of entries, and of an entry.
+    first : int
+        Offset of the first directory.
+    """
+
+    def __init__(self, file: IO[bytes], label: str) -> None:
+        self._file, self._label = file, label
+        self.size = file.seek(0, 2)
+        file.seek(0)
+        self.head = file.read(8)
+        if not is_tiff(self.head):
+            raise self.error("not a TIFF, or damaged")
+        self.order, self.is_big = _order(self.head), 43 in self.head[2:4]
+        self.pointer, self.counter, self.entry = "I", "H", "HHI4s"
+        if self.is_big:
+            self.pointer, self.counter, self.entry = "Q", "Q", "HHQ8s"
+        (self.first,) = self.unpacked(8 if self.is_big else 4, self.pointer)
+
+    def entries(self, at: int) -> tuple[dict[int, Entry], int]:
+        """Return the entries of the directory at an offset, and where the pointer behind it is."""
+        (count,) = self.unpacked(at, self.counter)
+        at += struct.calcsize("=" + self.counter)
+        width = struct.calcsize("=" + self.entry)
+        listed = struct.iter_unpack(self.order + self.entry, self.bytes_at(at, count * width))
+        found = {
+            tag: Entry(kind, length, field, at + width * number - len(field))
+            for number, (tag, kind, length, field) in enumerate(listed, 1)
+        }
+        return found, at + count * width
+
+    def place(self, one: Entry) -> int:
+        """Return the offset of the values of an entry."""
+        if _SIZES.get(one.kind, 0) * one.length <= len(one.field):
+            return one.at
+        (at,) = struct.unpack(self.order + self.pointer, one.field)
+        return int(at)
+
+    def value(self, one: Entry, longest: int = 1 << 20) -> bytes:
+        """Return the values of an entry; those of more than `longest` bytes are damaged."""
+        size = _SIZES.get(one.kind, 0) * one.length
+        if not 0 < size <= longest:
+            raise self.error(f"a tag of {size:,} bytes: damaged")
+        return one.field[:size] if size <= len(one.field) else self.bytes_at(self.place(one), size)
+
+    def unpacked(self, at: int, form: str) -> tuple[int, ...]:
+        """Return the numbers at an offset."""
+        return struct.unpack(self.order + form, self.bytes_at(at, struct.calcsize("=" + form)))
+
+    def bytes_at(self, at: int, size: int) -> bytes:
+        """Return so many bytes from an offset on."""
+        if at + size > self.size:
+            raise self.error(f"cut short, or damaged: {size:,} bytes are expected at byte {at:,}")
+        self._file.seek(at)
+        data = self._file.read(size)
+        if len(data) < size:
+            raise self.error("cut short while it was read")
+        return data
+
+    def error(self, what: str) -> DataError:
+        return DataError(f"{self._label}: {what}")
+
+
+def examine(data: bytes, label: str) -> tuple[Header, bytes] | None:
+    """Return what the first directory says, and the file for OpenCV to leave colours as they are.
+
+    None: it cannot be read.
 
     Raises
     ------
@@ -317,7 +381,7 @@ def examine(data: bytes, label: str) -> Tiff | None:
         data = _not_multiplied(data, tags)
     # OpenCV moves 10, 12 and 14 bits to the upper end of 16
     white = float(((1 << bits) - 1) << (16 - bits)) if 8 < bits < 16 else None
-    return Tiff(data, white, inverted, _alpha(tags))
+    return Header(white=white, inverted=inverted, alpha=_alpha(tags)), data
 
 
 def orientation(data: bytes) -> int:
@@ -359,36 +423,30 @@ def _order(data: bytes) -> str:
 
 def _directories(data: bytes, most: int | None = None) -> list[dict[int, _Tag]]:
     """Return the tags wanted of each directory, up to what is no directory."""
-    if not is_tiff(data):
-        return []
-    order, big = _order(data), 43 in data[2:4]
-    pointer, count, value = ("Q", "Q", 8) if big else ("I", "H", 4)
     found: list[dict[int, _Tag]] = []
     seen: set[int] = set()
-    try:
-        (at,) = struct.unpack_from(order + pointer, data, 8 if big else 4)
+    with suppress(DataError):  # beyond the end, or no TIFF
+        tiff = Directories(io.BytesIO(data), "")
+        at = tiff.first
         while at and at not in seen and len(found) != most:
             seen.add(at)
-            (entries,) = struct.unpack_from(order + count, data, at)
-            at += struct.calcsize(order + count)
-            width = 4 + 2 * value
-            if at + entries * width > len(data):
-                break
-            tags: dict[int, _Tag] = {}
-            for place in range(at, at + entries * width, width):
-                tag, kind, length = struct.unpack_from(f"{order}HH{pointer}", data, place)
-                if tag not in _WANTED or (tag == _DESCRIPTION) != (kind == _TEXT):
-                    continue
-                if kind == _TEXT:
-                    length = min(length, _VALUES)
-                if kind not in _TYPES or not 0 < length <= _VALUES:
-                    continue
-                form, inside = f"{order}{length}{_TYPES[kind]}", place + 4 + value
-                if struct.calcsize(form) > value:
-                    (inside,) = struct.unpack_from(order + pointer, data, inside)
-                tags[tag] = _Tag(struct.unpack_from(form, data, inside), inside)
-            found.append(tags)
-            (at,) = struct.unpack_from(order + pointer, data, at + entries * width)
-    except struct.error:  # beyond the end
-        pass
+            entries, end = tiff.entries(at)
+            found.append(
+                {name: _tag(tiff, one) for name, one in entries.items() if _fits(name, one)}
+            )
+            (at,) = tiff.unpacked(end, tiff.pointer)
     return found
+
+
+def _fits(name: int, one: Entry) -> bool:
+    if name not in _WANTED or one.kind not in _TYPES or one.length < 1:
+        return False
+    is_text = one.kind == _TEXT
+    return (name == _DESCRIPTION) == is_text and (is_text or one.length <= _VALUES)
+
+
+def _tag(tiff: Directories, one: Entry) -> _Tag:
+    if one.length > _VALUES:
+        one = one._replace(length=_VALUES)
+    form = f"{tiff.order}{one.length}{_TYPES[one.kind]}"
+    return _Tag(struct.unpack(form, tiff.value(one)), tiff.place(one))

@@ -9,7 +9,6 @@ from __future__ import annotations
 import importlib
 import re
 import tempfile
-import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,9 @@ import numpy as np
 
 from adv2e.effects.frames.encoding import full_scale_of, is_light
 from adv2e.errors import DataError, MissingExtraError
-from adv2e.process.standard_error import overhearing
+from adv2e.files.regular import reading
+from adv2e.files.zips import Members
+from adv2e.process.standard_error import Shared, overhearing
 from adv2e.sources.frame import Frame, Image, check_pixels
 from adv2e.sources.images import headers
 from adv2e.sources.images.alpha import Alpha, with_alpha
@@ -32,30 +33,17 @@ IMAGE_SUFFIXES = (
 """Still images that can be read (``.exr`` with the optional package OpenEXR)."""
 
 
-class _Quiet:
-    """Reference-counted silencing of OpenCV's log, for all threads of the process."""
-
-    def __init__(self) -> None:
-        # OpenCV 5 has cv2.utils.logging, OpenCV 4 has it only as cv2.setLogLevel
-        self._logging: Any = cv2.utils.logging if hasattr(cv2.utils, "logging") else cv2
-        self._lock = threading.Lock()
-        self._inside = self._level = 0
-
-    def __enter__(self) -> None:
-        with self._lock:
-            self._inside += 1
-            if self._inside == 1:
-                self._level = self._logging.getLogLevel()
-                self._logging.setLogLevel(0)
-
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._inside -= 1
-            if self._inside == 0:
-                self._logging.setLogLevel(self._level)
+# OpenCV 5 has cv2.utils.logging, OpenCV 4 has it only as cv2.setLogLevel
+_logging: Any = cv2.utils.logging if hasattr(cv2.utils, "logging") else cv2
 
 
-quiet = _Quiet()
+def _silence() -> int:
+    level: int = _logging.getLogLevel()
+    _logging.setLogLevel(0)
+    return level
+
+
+quiet = Shared(_silence, _logging.setLogLevel)
 """Context in which OpenCV prints nothing about the pictures that it decodes."""
 
 
@@ -73,11 +61,14 @@ def rgb_of(image: Any) -> Image:
 
 def read_image(path: Path) -> Frame:
     """Return the image in a file, all its bits kept; DataError if it cannot be read."""
-    try:
+    with reading(path):
         data = path.read_bytes()
-    except OSError as error:
-        raise DataError(f"{path}: {error.strerror}") from error
     return decode_image(data, str(path))
+
+
+def image_of(files: Members, name: str) -> Frame:
+    """Return an image of a folder or zip; DataError if it cannot be read."""
+    return decode_image(files.read(name), files.label(name))
 
 
 def decode_image(data: bytes, label: str) -> Frame:
@@ -100,7 +91,12 @@ def decode_image(data: bytes, label: str) -> Frame:
     if data.startswith(b"GIF8") or data[4:12] == b"ftypavis":
         raise DataError(f"{label}: is a GIF or AVIF of pictures, whatever its name; write PNG")
     if headers.is_tiff(data):
-        return _decode_tiff(data, label)
+        examined = headers.examine(data, label)
+        if examined is None:
+            raise _unreadable(label)
+        header, data = examined
+        image, _, says = _decoded(data, label)  # upright
+        return _frame(image, header, says, label)
     header = read_header(data)
     check_size(header.width, header.height, data, label)
     if header.pictures > 1:
@@ -114,24 +110,24 @@ def decode_image(data: bytes, label: str) -> Frame:
 
 def _frame(image: Any, header: Header, says: str, label: str) -> Frame:
     """Return an image as OpenCV gives it, with what its header says of alpha, white and light."""
-    colours, alpha = rgb_of(image), _fourth(image)
+    colours, alpha, white = rgb_of(image), _fourth(image), header.white
+    if not is_light(colours.dtype):  # its source refuses it
+        return Frame(colours)
     if header.grey:
         colours = np.ascontiguousarray(colours[..., 0])
     elif header.clear is not None:
         there = np.iinfo(colours.dtype).max
         alpha = np.where(colours == header.clear, 0, there).astype(colours.dtype)
-    white = header.white
     if white is not None and colours.max() > white:
         above = f"above the {white:g} that its header states"
         raise DataError(f"{label}: a number of {colours.max()}, {above}")
-    stated: dict[str, Any] = {
-        "encoding": header.encoding,
-        "says": says,
-        "densities": header.densities,
-    }
+    most = white or full_scale_of(colours.dtype)
+    if header.inverted:
+        colours = np.asarray(most - colours).astype(colours.dtype)
+    stated: Any = {"white": white, "encoding": header.encoding, "says": says}
+    stated["densities"] = header.densities
     if alpha is None:
-        return Frame(colours, white=white, **stated)
-    most = full_scale_of(colours.dtype)
+        return Frame(colours, **stated)
     return replace(with_alpha(colours, alpha, header.alpha, most, label), **stated)
 
 
@@ -147,22 +143,6 @@ def upright(image: Image, orientation: int) -> Image:
     if orientation in (2, 3, 6, 7):
         image = image[:, ::-1]
     return np.ascontiguousarray(image)
-
-
-def _decode_tiff(data: bytes, label: str) -> Frame:
-    header = headers.examine(data, label)
-    if header is None:
-        raise _unreadable(label)
-    image, _, says = _decoded(header.data, label)  # upright
-    colours, alpha, white = rgb_of(image), _fourth(image), header.white
-    if not is_light(colours.dtype):  # its source refuses it
-        return Frame(colours)
-    most = white or full_scale_of(colours.dtype)
-    if header.inverted:
-        colours = np.asarray(most - colours).astype(colours.dtype)
-    if alpha is None:
-        return Frame(colours, white=white, says=says)
-    return replace(with_alpha(colours, alpha, header.alpha, most, label), white=white, says=says)
 
 
 _CUT = re.compile(

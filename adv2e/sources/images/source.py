@@ -15,6 +15,7 @@ from statistics import mean, median
 from typing import Any
 
 from adv2e.errors import DataError
+from adv2e.files.regular import reading
 from adv2e.label import guessed, left_out, told_of
 from adv2e.sources.base import GivenTimes, Selection
 from adv2e.sources.images.opencv import IMAGE_SUFFIXES, read_image
@@ -250,10 +251,8 @@ def image_files(folder: Path) -> list[Path]:
 
 
 def _image_names(folder: Path) -> list[str]:
-    try:
+    with reading(folder):
         entries = [entry for entry in folder.iterdir() if not entry.name.startswith(".")]
-    except OSError as error:
-        raise DataError(f"{folder}: {error.strerror}") from error
     return [e.name for e in entries if e.suffix.lower() in IMAGE_SUFFIXES and e.is_file()]
 
 

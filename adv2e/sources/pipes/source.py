@@ -26,8 +26,6 @@ from adv2e.sources.pipes.stream import (
     standard_input,
     y4m_layout,
 )
-from adv2e.sources.times.lists import read_list
-from adv2e.sources.times.rates import Stamp
 
 _A_MOMENT_S = 0.2
 """A terminal interrupts one process after the other: a producer may end before we hear of it."""
@@ -81,7 +79,7 @@ class PipeSource(Source):
         super().__init__(Path(NAME), layout.kind, selection, has_clock)
         self.waits = True
         self._stream, self._layout, self._given = stream, layout, given
-        self._stamps: list[Stamp] | None = None
+        self._times: list[int] | None = None
         self._rate = given.rate or layout.rate
         self._take_times()
         self._first: bytes | None = self._next(0)
@@ -110,13 +108,7 @@ class PipeSource(Source):
 
     def _take_times(self) -> None:
         if self._given.timestamps is not None:
-            label = str(self._given.timestamps)
-            found = read_list(self._given.timestamps, time_unit=self._given.time_unit)
-            found.check_instants(label)
-            doubts, notes = found.told(label)
-            self._stamps, self._rate = found.stamps, None
-            self.doubts += doubts
-            self.notes += notes
+            self._times, self._rate = self._take_list(self._given), None
         elif self._given.time_unit is not None:
             raise DataError(f"{NAME}: --time-unit is for lists of times, and none is given")
         elif self._rate is None:
@@ -129,10 +121,10 @@ class PipeSource(Source):
     def _time_ns(self, number: int) -> int:
         if self._rate is not None:
             return self._rate.time_ns(number)
-        assert self._stamps is not None
-        if number >= len(self._stamps):
+        assert self._times is not None
+        if number >= len(self._times):
             raise DataError(f"{self._given.timestamps}: {number} times, and more frames come")
-        return self._stamps[number].t_ns
+        return self._times[number]
 
     def _next(self, number: int) -> bytes | None:
         """Return the bytes of the next frame; None at the end."""
@@ -190,8 +182,8 @@ class PipeSource(Source):
             number += 1
             data = self._next(number)
         fault = ""
-        if self._stamps is not None and number != len(self._stamps):
-            fault = f"{self._given.timestamps}: {len(self._stamps)} times for {number} frames"
+        if self._times is not None and number != len(self._times):
+            fault = f"{self._given.timestamps}: {len(self._times)} times for {number} frames"
             if not self._was_interrupted():
                 raise DataError(fault)
         if self._stream.interrupt is not None and self._stream.interrupt.came:

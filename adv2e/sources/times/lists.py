@@ -19,7 +19,7 @@ from typing import Any
 from unicodedata import normalize
 
 from adv2e.errors import DataError
-from adv2e.files.regular import read_text_bytes
+from adv2e.files.regular import read_text_bytes, reading
 from adv2e.label import told_of
 from adv2e.sources.times.rates import NUMBER, Stamp, Unit, frame_unit, parse_ns, seconds
 
@@ -361,14 +361,6 @@ class FrameList:
     order: str = ""
     whole: bool = False
 
-    def check_instants(self, label: str) -> None:
-        """Raise DataError if it has exposures, for sources that do not take these."""
-        if any(stamp.exposure_ns for stamp in self.stamps):
-            raise DataError(
-                f"{label}: exposures, with start and end, are for pictures and stacks: make a"
-                " folder of pictures of these frames, or a list of their middles"
-            )
-
     def told(self, label: str) -> tuple[list[str], list[str]]:
         """Return doubts about the list `label`, and notes on it."""
         notes = [f"times from {label}: {self.columns}"]
@@ -418,10 +410,8 @@ def _paired(text: str, path: Path, ends: Path) -> tuple[str, str]:
 
 
 def _text(path: Path) -> str:
-    try:
+    with reading(path):
         return decoded(read_text_bytes(path), str(path))
-    except OSError as error:
-        raise DataError(f"{path}: {error.strerror}") from error
 
 
 def decoded(data: bytes, label: str) -> str:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import io
 import logging
 import os
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -22,6 +21,8 @@ import av.logging
 from av.stream import Disposition
 
 from adv2e.errors import DataError
+from adv2e.files.regular import reading
+from adv2e.process.standard_error import Shared
 from adv2e.sources.frame import Track, choose
 
 FORMATS = (
@@ -82,10 +83,8 @@ def opened(path: str, track: str | None = None) -> Iterator[Video]:
     DataError
         It is no video, damaged beyond reading, or has no such track.
     """
-    try:
+    with reading(path):
         file = io.FileIO(path)
-    except OSError as error:
-        raise DataError(f"{path}: {error.strerror}") from error
     with file:
         size = os.fstat(file.fileno()).st_size
         if not size:
@@ -146,31 +145,15 @@ def _chosen(container: Any, wanted: str | None, name: str) -> tuple[Any, list[st
     return films[number or 0], told
 
 
-class _Listening:
-    """Turns FFmpeg's log on for all threads at once: the last to leave turns it off."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._inside = 0
-        self._before: tuple[int | None, bool] = None, True
-
-    def enter(self) -> None:
-        with self._lock:
-            self._inside += 1
-            if self._inside == 1:
-                self._before = av.logging.get_level(), av.logging.get_skip_repeated()
-                av.logging.set_skip_repeated(False)
-                av.logging.set_level(av.logging.ERROR)
-
-    def leave(self) -> None:
-        with self._lock:
-            self._inside -= 1
-            if self._inside == 0:
-                av.logging.set_level(self._before[0])
-                av.logging.set_skip_repeated(self._before[1])
+def _log(level: int | None, skips_repeated: bool) -> tuple[int | None, bool]:
+    """Set what FFmpeg logs; return what it logged before."""
+    before = av.logging.get_level(), av.logging.get_skip_repeated()
+    av.logging.set_skip_repeated(skips_repeated)
+    av.logging.set_level(level)
+    return before
 
 
-_LISTENING = _Listening()
+_listening = Shared(lambda: _log(av.logging.ERROR, False), lambda before: _log(*before))
 # what threads of others say meanwhile is not printed
 logging.getLogger("libav").addHandler(logging.NullHandler())
 
@@ -178,9 +161,5 @@ logging.getLogger("libav").addHandler(logging.NullHandler())
 @contextmanager
 def overheard() -> Iterator[list[tuple[int, str, str]]]:
     """Give errors that FFmpeg tells in no other way: level, part and text, of this thread alone."""
-    _LISTENING.enter()
-    try:
-        with av.logging.Capture() as said:
-            yield said
-    finally:
-        _LISTENING.leave()
+    with _listening, av.logging.Capture() as said:
+        yield said

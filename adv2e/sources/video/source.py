@@ -18,8 +18,7 @@ from adv2e.errors import DataError
 from adv2e.label import left_out, told_of
 from adv2e.sources.base import GivenTimes, Selection, Source
 from adv2e.sources.frame import Light, Shot
-from adv2e.sources.times.lists import read_list
-from adv2e.sources.times.rates import NS_PER_S, Stamp, gap_doubts, seconds
+from adv2e.sources.times.rates import NS_PER_S, gap_doubts, seconds
 from adv2e.sources.video.listing import Listing, list_pictures
 from adv2e.sources.video.opening import Video, opened
 from adv2e.sources.video.pictures import Converter, encoding_of, is_stated, oddly_shown
@@ -94,25 +93,17 @@ class VideoSource(Source):
             self.notes.append(f"{given} replaces the times in the file")
         self._listed: int | None = None
         if given.timestamps is not None:
-            stamps = self._list(given.timestamps, given.time_unit)
-            self._listed = len(stamps)
-            self._check_listed(len(stamps))
-            self.doubts += gap_doubts([stamp.t_ns for stamp in stamps], str(given.timestamps))
-            return lambda number: stamps[number].t_ns
+            own_s = self._listing.usual_ns / NS_PER_S if self._listing.shown_ns else 0
+            times = self._take_list(given, own_s)
+            self._listed = len(times)
+            self._check_listed(len(times))
+            self.doubts += gap_doubts(times, str(given.timestamps))
+            return times.__getitem__
         if given.time_unit is not None:
             raise DataError(
                 f"{self.path}: --time-unit is for lists of times; this video has its own"
             )
         return None if given.rate is None else given.rate.time_ns
-
-    def _list(self, timestamps: Path, time_unit: str | None) -> list[Stamp]:
-        own_s = self._listing.usual_ns / NS_PER_S if self._listing.shown_ns else 0
-        found = read_list(timestamps, time_unit=time_unit, own_step_s=own_s)
-        found.check_instants(str(timestamps))
-        doubts, notes = found.told(str(timestamps))
-        self.doubts += doubts
-        self.notes += notes
-        return found.stamps
 
     def _check_listed(self, listed: int) -> None:
         if listed == self._listing.count:
