@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -49,8 +50,9 @@ class FilmRecordings:
     events: Sequence[Events]
     notes: list[str]
 
+    @cached_property
     def stream(self) -> Stream:
-        """Return the events of all recordings, side by side on one wide sensor."""
+        """Events of all recordings, side by side on one wide sensor."""
         width, height = self.films.size
         parts = []
         for number, events in enumerate(self.events):

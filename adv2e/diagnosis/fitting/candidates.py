@@ -147,6 +147,11 @@ class Candidate:
         )
 
     @property
+    def keys(self) -> set[str]:
+        """Keys that are fitted."""
+        return {one.key for one in self.parameters}
+
+    @property
     def known_or_not(self) -> tuple[tuple[float, float], ...]:
         """Prior of every parameter: `known`, or :data:`NOTHING_KNOWN` for each."""
         return self.known or (NOTHING_KNOWN,) * len(self.parameters)
