@@ -25,7 +25,7 @@ LIMITS = {
     "compilation": 285,
     "config": 1315,
     "conversion": 1515,
-    "diagnosis": 8235,
+    "diagnosis": 8170,
     "effects": 1650,
     "exporting": 1075,
     "files": 785,

@@ -12,7 +12,7 @@ from adv2e.background import default_threads
 from adv2e.config import Config
 from adv2e.diagnosis.configurations import of_known_light, own_of
 from adv2e.diagnosis.data.evidence import Evidence
-from adv2e.diagnosis.data.scene import Placed, Scene
+from adv2e.diagnosis.data.scene import Scene
 from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.outcome.findings import (
     Given,
@@ -199,13 +199,12 @@ class _SoFar:
         """Tell of thresholds that match, or of simulations of the declared model."""
         if self._known is None:
             return
-        self._scene, self._measured = scene, Placed.of(evidence.stream, scene)
-        self._before = [Placed.of(stream, scene) for stream in streams]
+        self._scene, self._measured, self._before = scene, evidence.stream, streams
         checks, split = evidence.notes, scene.split.text()
         known = {"notes": checks, "input_checks": checks, "split": split}
         self._tell(**self._given.told(declared), **self._pictures(self._before), **known)
 
-    def _pictures(self, after: Sequence[Placed]) -> dict[str, Any]:
+    def _pictures(self, after: Sequence[Stream]) -> dict[str, Any]:
         if not after:
             return {}
         return pictures_of(self._scene, self._measured, self._before, after)
@@ -214,10 +213,9 @@ class _SoFar:
         """Tell of a model that takes the place of the one before."""
         if self._known is None:
             return
-        after: list[Placed] = []
+        after: list[Stream] = []
         if state is not search.declared:
-            streams = drawn(self._simulator.aside(), state.config)
-            after = [Placed.of(stream, self._scene) for stream in streams]
+            after = drawn(self._simulator.aside(), state.config)
         self._rejections = search.reference.rejections
         self._tell(
             **self._given.told(state.config, state.fits),

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from adv2e.config import Config
 from adv2e.diagnosis.configurations import of_known_light, own_of
 from adv2e.diagnosis.data.evidence import Evidence
-from adv2e.diagnosis.data.scene import Placed, Scene
+from adv2e.diagnosis.data.scene import Scene
 from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.diagnose import diagnose
 from adv2e.diagnosis.film.fitting import FilmFitter, Place, first_point
@@ -214,6 +214,8 @@ def _diagnosis(
         judge.streams(step.place.view, step.place.config, range(_FIRST_DRAW, _FIRST_DRAW + _DRAWS))
         for step in (first, last)
     ]
+    evidence = evidence_of(films, last.place.view, judge.measured, "")
+    scene = Scene.of_evidence(evidence, config)
     return Diagnosis(
         verdict=verdict,
         remark=remark,
@@ -225,7 +227,7 @@ def _diagnosis(
         split="every second recording is fitted to, from the first; the others judge",
         own=own_of(config),
         view=[*_fitted_view(last.place.view, films), _late(late_us)],
-        **_pictures(last, judge, streams),
+        **pictures_of(scene, evidence.stream, *streams),
         **about,
     )
 
@@ -274,14 +276,6 @@ def _errors(
         )
         rows.append(ErrorRow(name, before, after, between))
     return rows
-
-
-def _pictures(last: Step, judge: FilmFitter, streams: Sequence[Sequence[Stream]]) -> dict[str, Any]:
-    evidence = evidence_of(judge.films, last.place.view, judge.measured, "")
-    scene = Scene.of_evidence(evidence, last.place.config)
-    measured = Placed.of(evidence.stream, scene)
-    before, after = ([Placed.of(one, scene) for one in side] for side in streams)
-    return pictures_of(scene, measured, before, after)
 
 
 def evidence_of(films: Films, view: View, stream: Stream, name: str) -> Evidence:

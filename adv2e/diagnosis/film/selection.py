@@ -128,7 +128,8 @@ class FilmSearch:
         tried = [(one, start) for one in open_ for start in one.starts]
         places = [self._with(step, one, start) for one, start in tried]
         with ThreadPoolExecutor(self._threads) as pool:
-            misfits = list(pool.map(self._rough, places))
+            rough = pool.map(lambda at: self._fitter.residual(at.view, at.config), places)
+            misfits = [first.times(second) for first, second in rough]
         best: dict[str, tuple[float, Candidate, Place]] = {}
         for (one, _), place, misfit in zip(tried, places, misfits, strict=True):
             if one.name not in best or misfit < best[one.name][0]:
@@ -196,10 +197,6 @@ class FilmSearch:
         place = step.place
         keys = Candidate.joined([place.keys, one])
         return replace(place, keys=keys, point=np.concatenate([place.point, one.scaled(start)]))
-
-    def _rough(self, place: Place) -> float:
-        first, second = self._fitter.residual(place.view, place.config)
-        return first.times(second)
 
     def _judged(self, place: Place, effects: tuple[Candidate, ...]) -> Step:
         each = self._judge.each(place.view, place.config, _JUDGED)

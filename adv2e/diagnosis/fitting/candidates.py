@@ -159,6 +159,11 @@ class Candidate:
     def scaled(self, values: Sequence[float]) -> list[float]:
         return [one.scaled(value) for one, value in zip(self.parameters, values, strict=True)]
 
+    def inside(self, point: Point) -> NDArray[np.float64]:
+        """Return the physical point that is nearest."""
+        pairs = zip(self.parameters, point, strict=True)
+        return np.array([one.scaled(one.value_at(at)) for one, at in pairs])
+
     def applied(self, config: Config, point: Point) -> Config:
         values = to_dict(config)
         for key, value in self.defaults:

@@ -24,6 +24,7 @@ from adv2e.diagnosis.data.scene import (
     Placed,
     Scene,
 )
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.data.stimulus import Leaps
 from adv2e.diagnosis.statistics.groups import excess
 from adv2e.diagnosis.statistics.rates import by_load, rate_hz
@@ -68,11 +69,16 @@ class _Axes:
 
 
 def pictures_of(
-    scene: Scene, measured: Placed, before: Sequence[Placed], after: Sequence[Placed]
+    scene: Scene, measured: Stream, before: Sequence[Stream], after: Sequence[Stream]
 ) -> dict[str, Any]:
-    """Return all of the picture, by the names of a diagnosis; arguments as of :func:`curves_of`."""
+    """Return all of the picture, by the names of a diagnosis.
+
+    `before` and `after` are simulations of the declared model and of the model found.
+    """
+    placed = Placed.of(measured, scene)
+    first, second = ([Placed.of(one, scene) for one in some] for some in (before, after))
     kinds = {"curves": curves_of, "maps": maps_of, "totals": totals_of, "snapshot": snapshot_of}
-    return {name: kind(scene, measured, before, after) for name, kind in kinds.items()}
+    return {name: kind(scene, placed, first, second) for name, kind in kinds.items()}
 
 
 def curves_of(

@@ -15,7 +15,6 @@ from adv2e.comparison.distances import SIGMAS_US, smoothed_norms
 from adv2e.config import Config
 from adv2e.diagnosis.configurations import without_coupling
 from adv2e.diagnosis.data import splits
-from adv2e.diagnosis.data.scene import Placed
 from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.fitting.candidates import Candidate, neutral_value
 from adv2e.diagnosis.hints.readouts import DRIFT
@@ -197,11 +196,8 @@ def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion
     if verdict in ("consistent", "unexplained") and kept is not declared:
         kept, after = declared, before
         rows = error_rows(of_before, of_before)
-    recorded = Placed.of(prepared.evidence.stream, scene)
-    first, second = (
-        [Placed.of(stream, scene) for stream in streams] for streams in (before, after)
-    )
-    return Conclusion(verdict, kept, rows, pictures_of(scene, recorded, first, second))
+    pictures = pictures_of(scene, prepared.evidence.stream, before, after)
+    return Conclusion(verdict, kept, rows, pictures)
 
 
 # ---- The size of each effect that would have been seen.
