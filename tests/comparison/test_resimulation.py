@@ -58,7 +58,7 @@ def test_floats_of_which_nobody_knows_the_white_are_refused(calls):
         yield Frame(np.full((2, 3), 200.0, np.float32), t_ns=0)
 
     simulate_events = resimulation.resimulator(bright, from_dict({}), "linear", (3, 2))
-    with pytest.raises(DataError, match="frames.full_scale"):
+    with pytest.raises(DataError, match=r"frames\.full_scale"):
         simulate_events(0)
     config = from_dict({"frames": {"full_scale": 255}})
     resimulation.resimulator(bright, config, "linear", (3, 2))(0)

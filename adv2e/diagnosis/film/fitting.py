@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -210,7 +210,7 @@ class _Column:
     """Derivative by one number, of each seed, in some bins."""
 
     by_seed: tuple[Numbers, ...]
-    bins: slice = field(default_factory=lambda: _ALL)
+    bins: slice
 
 
 class _Descent:
@@ -263,13 +263,12 @@ class _Descent:
 
     def _columns(self, place: Place, here: list[Numbers]) -> list[_Column]:
         """Return the derivatives by all free numbers: of the view, of the camera, of the path."""
-        view, places, steps = place.view, [], []
+        view, moves = place.view, list[tuple[Place, float]]()
         for one in self._free:
             value, step = getattr(view, one.name), one.step
             if one.moved(value, step) == value:
                 step = -step
-            places.append(replace(place, view=view.moved(one, step)))
-            steps.append(step)
+            moves.append((replace(place, view=view.moved(one, step)), step))
         parameters = place.keys.parameters
         for k, parameter in enumerate(parameters):
             step = _STEP
@@ -277,17 +276,14 @@ class _Descent:
                 step = -step
             point = place.point.copy()
             point[k] += step
-            places.append(replace(place, point=point))
-            steps.append(step)
+            moves.append((replace(place, point=point), step))
         groups = [(axis, k) for axis in (0, 1) for k in range(min(_APART, len(view.path)))]
         for axis, k in groups if self._path else ():
             path = view.path.copy()
             path[k::_APART, axis] += _STEP_PX
-            places.append(replace(place, view=replace(view, path=path)))
-            steps.append(_STEP_PX)
-        pairs = zip(places, steps, strict=True)
-        slopes = list(self._pool.map(lambda pair: self._slope_by(here, *pair), pairs))
-        columns = [_Column(one) for one in slopes[: len(self._free) + len(parameters)]]
+            moves.append((replace(place, view=replace(view, path=path)), _STEP_PX))
+        slopes = list(self._pool.map(lambda move: self._slope_by(here, *move), moves))
+        columns = [_Column(one, _ALL) for one in slopes[: len(self._free) + len(parameters)]]
         if self._path:
             columns += self._of_the_path(dict(zip(groups, slopes[len(columns) :], strict=True)))
         return columns
