@@ -23,7 +23,7 @@ from adv2e.diagnosis.outcome.findings import (
     signatures_of,
 )
 from adv2e.diagnosis.outcome.picture import pictures_of
-from adv2e.diagnosis.outcome.verdict import conclude, detectable, drawn, remark_of
+from adv2e.diagnosis.outcome.verdict import conclude, detectable, drawn
 from adv2e.diagnosis.prepare import DECLARED, prepare
 from adv2e.diagnosis.selection.reference import State
 from adv2e.diagnosis.selection.search import Search
@@ -120,18 +120,14 @@ def diagnose(
         reference.begin = so_far.begin
         search = Search(reference, prepared.candidates, so_far.changed)
         outcome = search.run()
-        found = conclude(prepared, search, outcome)
-        kept = found.kept
+        kept, found = conclude(prepared, search, outcome)
         whole = replace(
             begun,
             **given.told(kept.config, kept.fits),
-            **found.pictures,
-            verdict=found.verdict,
-            remark=remark_of(found.verdict, outcome),
+            **found,
             still="",
             alternatives=outcome.alternatives if kept.fits else [],
             rejected=rejected_of(reference, outcome, kept, search.candidates),
-            errors=found.errors,
             global_p_before=search.overall(search.declared),
             global_p_after=search.overall(kept),
             signatures=signatures_of(reference, search.declared, kept),

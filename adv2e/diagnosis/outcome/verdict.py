@@ -141,25 +141,17 @@ DRAWS = 12
 _FIRST_DRAW = 20_000
 
 
-@dataclass(frozen=True)
-class Conclusion:
-    """Verdict on a recording, with errors and pictures of the declared model and of `kept`.
-
-    `kept` is the model that is reported: the declared one where no effect is named.
-    """
-
-    verdict: Verdict
-    kept: State
-    errors: list[ErrorRow]
-    pictures: dict[str, Any]
-
-
 def drawn(simulator: Simulator, config: Config, first: int = _FIRST_DRAW) -> list[Stream]:
     """Return simulations of a model to compare with the recording."""
     return simulator.streams(config, range(first, first + DRAWS))
 
 
-def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion:
+def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> tuple[State, dict[str, Any]]:
+    """Return the model that is reported, and what a diagnosis says of it beside the declared one.
+
+    It is the declared one where no effect is named.  Verdict, remark, errors and pictures are by
+    the names of a diagnosis.
+    """
     scene, simulator = prepared.scene, prepared.reference.sampler.simulator
     simulator.begin("judging on data not used so far")
 
@@ -197,7 +189,8 @@ def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion
         kept, after = declared, before
         rows = error_rows(of_before, of_before)
     pictures = pictures_of(scene, prepared.evidence.stream, before, after)
-    return Conclusion(verdict, kept, rows, pictures)
+    told = {"verdict": verdict, "remark": remark_of(verdict, outcome), "errors": rows}
+    return kept, {**told, **pictures}
 
 
 # ---- The size of each effect that would have been seen.
