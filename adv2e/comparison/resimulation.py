@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from adv2e.config.model import Config
-from adv2e.conversion.reading import Decoding
 from adv2e.conversion.simulation import events_from_light
+from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.effects.hooks import Frames
 from adv2e.errors import DataError
 from adv2e.events import Events
 from adv2e.geometry import Size
 from adv2e.light.decoding import decoder_for
-from adv2e.light.sensor import fitting_of
+from adv2e.light.sensor import Fitting, fitting_of
 from adv2e.sources.frame import Frame
 
 
@@ -43,9 +43,10 @@ def resimulator(
 
 
 def _light(frames: Iterable[Frame], config: Config, encoding: str, size: tuple[int, int]) -> Frames:
-    decoding: Decoding | None = None
+    decoder: LightDecoder | None = None
+    fitting: Fitting | None = None
     for frame in frames:
-        if decoding is None:
+        if decoder is None:
             image = frame.image
             rows, columns = image.shape[:2]
             fitting = fitting_of(columns, rows, config.sensor, frame.label)
@@ -58,7 +59,7 @@ def _light(frames: Iterable[Frame], config: Config, encoding: str, size: tuple[i
             decoder = decoder_for(
                 config.frames, image.dtype, image.ndim == 3, auto=encoding, white=frame.white
             )
-            white = config.frames.full_scale
-            decoding = Decoding(decoder, False, False, full_scale=white, fitting=fitting)
-        light, _ = decoding.decoded(frame)
-        yield light
+        if frame.odd_white and config.frames.full_scale is None:
+            raise DataError(f"{frame.label}: {frame.odd_white}")
+        light = decoder.decode(frame.image, frame.alpha)
+        yield frame.t_ns, light if fitting is None else fitting.light(light, frame.label)

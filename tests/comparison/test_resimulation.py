@@ -53,18 +53,6 @@ def test_a_configured_encoding_and_full_scale_win(calls):
     assert light[1][1][0, 0] == pytest.approx(127.5)
 
 
-def test_floats_of_which_nobody_knows_the_white_are_refused(calls):
-    def bright():
-        yield Frame(np.full((2, 3), 200.0, np.float32), t_ns=0)
-
-    simulate_events = resimulation.resimulator(bright, from_dict({}), "linear", (3, 2))
-    with pytest.raises(DataError, match=r"frames\.full_scale"):
-        simulate_events(0)
-    config = from_dict({"frames": {"full_scale": 255}})
-    resimulation.resimulator(bright, config, "linear", (3, 2))(0)
-    assert calls[0][0][0][1][0, 0] == pytest.approx(200)
-
-
 def test_frames_come_to_the_sensor_of_the_events(calls):
     config = from_dict({"sensor": {"width": 1, "height": 1, "fit": "stretch"}})
     resimulation.resimulator(frames, config, "linear", (1, 1))(0)
