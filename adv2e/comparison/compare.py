@@ -23,7 +23,7 @@ from adv2e.comparison.distances import (
 from adv2e.comparison.features import trains
 from adv2e.comparison.offset import latency_offset_us
 from adv2e.comparison.sets import Stream, compare_sets, members
-from adv2e.comparison.two_samples import in_windows
+from adv2e.comparison.two_samples import Floor, in_windows
 from adv2e.comparison.windows import Windows, fixed_windows, frame_windows, span_of
 from adv2e.errors import DataError, UsageError, warn
 from adv2e.events import Events, Window, cut
@@ -102,9 +102,6 @@ def stream_statistics(
 
 SPLITS = 4
 """Half splits whose distances are averaged."""
-
-Floor = dict[str, float | None]
-"""A value for each measure, None where it is not defined."""
 
 
 def half_split(

@@ -71,6 +71,7 @@ FEATURES = (
 
 Right = NDArray[np.bool_]
 Floor = dict[str, float | None]
+"""A value for each measure, or kind of floor; None where it is not defined."""
 
 
 @dataclass(frozen=True)

@@ -228,13 +228,16 @@ _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_.:/+-]*[A-Za-z0-9_]|[A-Za-z_]")
 _WORDS_OF_1_1 = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
 
 
-def scalar_text(value: Scalar | tuple[Scalar, ...]) -> str:
+def scalar_text(value: Any) -> str:
     """Return `value` as YAML that reads back as the same value, under YAML 1.1 and 1.2 alike.
 
-    Floats are the shortest decimal that reads back as the same number, with a point.  Tuples are
-    flow sequences.
+    Floats are the shortest decimal that reads back as the same number, with a point.  Tuples and
+    lists are flow sequences, dictionaries flow mappings.
     """
-    if isinstance(value, tuple):
+    if isinstance(value, dict):
+        items = (f"{scalar_text(key)}: {scalar_text(item)}" for key, item in value.items())
+        return f"{{{', '.join(items)}}}"
+    if isinstance(value, (tuple, list)):
         return f"[{', '.join(map(scalar_text, value))}]"
     if value is None:
         return "null"
@@ -250,6 +253,7 @@ def scalar_text(value: Scalar | tuple[Scalar, ...]) -> str:
         return text
     if isinstance(value, int):
         return str(value)
+    assert isinstance(value, str)
     if _PLAIN.fullmatch(value) and value.lower() not in _WORDS_OF_1_1:
         return value
     quoted = yaml.dump(value, default_style='"', width=float("inf"), allow_unicode=True)

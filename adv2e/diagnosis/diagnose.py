@@ -8,31 +8,22 @@ from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
-from adv2e import __version__
 from adv2e.background import default_threads
 from adv2e.config import Config
-from adv2e.diagnosis.configurations import (
-    as_found,
-    declared_of,
-    defaults_of,
-    of_frames_again,
-    of_known_light,
-    own_of,
-)
+from adv2e.diagnosis.configurations import of_known_light, own_of
 from adv2e.diagnosis.data.evidence import Evidence
-from adv2e.diagnosis.data.scene import Placed, Scene
+from adv2e.diagnosis.data.scene import Scene
 from adv2e.diagnosis.data.splits import Stream
-from adv2e.diagnosis.fitting.fitted import Fitted
-from adv2e.diagnosis.fitting.fitter import thresholds_of
 from adv2e.diagnosis.outcome.findings import (
+    Given,
     about_drifts,
     about_frames,
-    finding_of,
+    facts_of,
     rejected_of,
     signatures_of,
 )
 from adv2e.diagnosis.outcome.picture import pictures_of
-from adv2e.diagnosis.outcome.verdict import conclude, detectable, drawn, remark_of
+from adv2e.diagnosis.outcome.verdict import conclude, detectable, drawn
 from adv2e.diagnosis.prepare import DECLARED, prepare
 from adv2e.diagnosis.selection.reference import State
 from adv2e.diagnosis.selection.search import Search
@@ -93,10 +84,12 @@ def diagnose(
         Too few events are left of a recording that would take too long.
     """
     began = time.perf_counter()
-    given = declared
+    as_given = declared
     if evidence.stimulus is not None:
         declared = of_known_light(declared, evidence.stimulus.steps)
     evidence = affordable(evidence, declared)
+    is_light, pixels = evidence.stimulus is not None, evidence.width * evidence.height
+    given = Given(as_given, written, free_thresholds, pixels, is_light)
     with closing(Simulator(evidence, threads or default_threads(), progress)) as simulator:
 
         def facts() -> dict[str, str]:
@@ -105,25 +98,7 @@ def diagnose(
                 "length": f"{evidence.seconds:.3f} s",
                 "events": f"{len(evidence.stream):,}",
                 **_light_facts(evidence),
-                "simulations": f"{simulator.done:,}",
-                "seed": str(declared.seed),
-                "time taken": f"{time.perf_counter() - began:.0f} s",
-                "adv2e": __version__,
-            }
-
-        def model(config: Config, fits: Sequence[Fitted] = ()) -> dict[str, Any]:
-            """Return what a diagnosis says of a model."""
-            effects = [finding_of(fit, evidence.width * evidence.height, config) for fit in fits]
-            nuisances = thresholds_of(config) if free_thresholds else {}
-            keys = (key for one in effects for key in one.parameters)
-            held = declared_of(given, [*nuisances, *keys])
-            is_known = evidence.stimulus is not None
-            return {
-                "effects": effects,
-                "nuisances": nuisances,
-                "declared_values": held,
-                "defaults": defaults_of(held, written),
-                "model": as_found(of_frames_again(config, given) if is_known else config),
+                **facts_of(simulator.done, declared.seed, began),
             }
 
         begun = Diagnosis(
@@ -134,28 +109,25 @@ def diagnose(
             masked=evidence.masked,
             own=own_of(declared),
             still=DECLARED,
-            **model(declared),
+            **given.told(declared),
         )
-        so_far = _SoFar(begun, simulator, model, facts, known)
+        so_far = _SoFar(begun, simulator, given, facts, known)
         simulator.begin(DECLARED)
-        given_to = evidence, declared, simulator, without, free_thresholds, log
-        prepared = prepare(*given_to, so_far.prepared)
+        prepared = prepare(
+            evidence, declared, simulator, without, free_thresholds, log, so_far.prepared
+        )
         evidence, reference = prepared.evidence, prepared.reference
         reference.begin = so_far.begin
         search = Search(reference, prepared.candidates, so_far.changed)
         outcome = search.run()
-        found = conclude(prepared, search, outcome)
-        kept = found.kept
+        kept, found = conclude(prepared, search, outcome)
         whole = replace(
             begun,
-            **model(kept.config, kept.fits),
-            **found.pictures,
-            verdict=found.verdict,
-            remark=remark_of(found.verdict, outcome),
+            **given.told(kept.config, kept.fits),
+            **found,
             still="",
             alternatives=outcome.alternatives if kept.fits else [],
             rejected=rejected_of(reference, outcome, kept, search.candidates),
-            errors=found.errors,
             global_p_before=search.overall(search.declared),
             global_p_after=search.overall(kept),
             signatures=signatures_of(reference, search.declared, kept),
@@ -196,20 +168,20 @@ class _SoFar:
     ----------
     begun : Diagnosis
         When nothing is known.
-    model, facts : callable
-        Return what a diagnosis says of a model, and its facts.
+    facts : callable
+        Returns the facts of the diagnosis.
     """
 
     def __init__(
         self,
         begun: Diagnosis,
         simulator: Simulator,
-        model: Callable[[Config, Sequence[Fitted]], dict[str, Any]],
+        given: Given,
         facts: Callable[[], dict[str, str]],
         known: Callable[[Diagnosis], None] | None,
     ) -> None:
         self._now, self._simulator, self._known = begun, simulator, known
-        self._model, self._facts, self._told_s = model, facts, 0.0
+        self._given, self._facts, self._told_s = given, facts, 0.0
 
     def _tell(self, **known: Any) -> None:
         if self._known is not None:
@@ -223,13 +195,12 @@ class _SoFar:
         """Tell of thresholds that match, or of simulations of the declared model."""
         if self._known is None:
             return
-        self._scene, self._measured = scene, Placed.of(evidence.stream, scene)
-        self._before = [Placed.of(stream, scene) for stream in streams]
+        self._scene, self._measured, self._before = scene, evidence.stream, streams
         checks, split = evidence.notes, scene.split.text()
         known = {"notes": checks, "input_checks": checks, "split": split}
-        self._tell(**self._model(declared, ()), **self._pictures(self._before), **known)
+        self._tell(**self._given.told(declared), **self._pictures(self._before), **known)
 
-    def _pictures(self, after: Sequence[Placed]) -> dict[str, Any]:
+    def _pictures(self, after: Sequence[Stream]) -> dict[str, Any]:
         if not after:
             return {}
         return pictures_of(self._scene, self._measured, self._before, after)
@@ -238,13 +209,12 @@ class _SoFar:
         """Tell of a model that takes the place of the one before."""
         if self._known is None:
             return
-        after: list[Placed] = []
+        after: list[Stream] = []
         if state is not search.declared:
-            streams = drawn(self._simulator.aside(), state.config)
-            after = [Placed.of(stream, self._scene) for stream in streams]
+            after = drawn(self._simulator.aside(), state.config)
         self._rejections = search.reference.rejections
         self._tell(
-            **self._model(state.config, state.fits),
+            **self._given.told(state.config, state.fits),
             **self._pictures(after),
             still="searching for what is missing",
             alternatives=state.rivals,

@@ -19,7 +19,6 @@ A table whose rectangles have few pixels each is a film (:mod:`adv2e.diagnosis.d
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.config.model import Sensor
-from adv2e.diagnosis.data.evidence import Evidence, check_events, covered
+from adv2e.diagnosis.data.evidence import Evidence, check_events, of_covered_time
 from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.data.stimulus import FILM_STEPS, LEAP_NS, Seen, Stimulus, of_film, refined
 from adv2e.diagnosis.tables.table import Table, read_table
@@ -37,7 +36,6 @@ from adv2e.files.regular import shown
 from adv2e.formats.reading import assemble, open_events
 from adv2e.geometry import Rectangle, Size, parse_rectangle
 from adv2e.light.sensor import check_beside
-from adv2e.reports.result import Masked
 
 _TIMES_NS = {"time_s": 1e9, "time_ms": 1e6, "time_us": 1e3}
 _LIGHTS_DN = {"light_dn": 1.0, "light": 255.0}
@@ -66,9 +64,9 @@ def read_known_light(
     width, height = recording.width, recording.height
     check_beside(width, height, sensor, recording.path)
     stimulus, part = read_stimulus(light, Size(width, height))
-    kept = recording.events
+    kept, t_us = recording.events, recording.events["t"]
     check_events(len(kept), events, "in all")
-    _check_span(kept["t"][[0, -1]], events, stimulus)
+    _check_span(t_us[[0, -1]], events, stimulus)
     times_ns = stimulus.looked_at_ns()
     seen = Seen(stimulus.at(times_ns).astype(np.float32), stimulus.region)
     times_s = np.asarray(times_ns * 1e-9, np.float64)
@@ -86,19 +84,9 @@ def read_known_light(
     if part != Rectangle(0, 0, width, height):
         inside = whole.cut(slice(part.y, part.y + part.height), slice(part.x, part.x + part.width))
         check_events(len(inside.stream), events, f"in the rectangle {part} of known light")
-        lost = Masked(
-            f"pixels outside the rectangle {part} of known light",
-            1.0 - len(inside.stream) / len(kept),
-        )
-        whole, kept = _with_mask(inside, lost), inside.stream.events()
-    first, last, text = covered(kept, times_s)
-    if not text:
-        return whole
-    return _with_mask(whole.during(first, last), Masked(text.replace(" frames", " instants"), 0.0))
-
-
-def _with_mask(evidence: Evidence, masked: Masked) -> Evidence:
-    return replace(evidence, masked=[*evidence.masked, masked])
+        outside = f"pixels outside the rectangle {part} of known light"
+        whole, t_us = inside.without(outside, of=len(kept)), inside.stream.t
+    return of_covered_time(whole, t_us)
 
 
 def read_stimulus(path: str | Path, size: Size) -> tuple[Stimulus, Rectangle]:

@@ -112,7 +112,7 @@ def prepare(
     bursts = [since_burst(own_period.period_us, own_period.first.begins_us)] if own_period else []
     statistics = SummaryStatistics(scene, streams, bursts)
     by_seed = dict(zip(PILOT_SEEDS, streams, strict=True))
-    pilot = Pilot(evidence, declared, statistics, by_seed, simulator.of)
+    pilot = Pilot(evidence, declared, statistics, by_seed, simulator)
     frames, levels = (None, None) if known else (between_frames(pilot), between_levels(pilot))
     hints = hints_of(evidence, declared, scene, streams, simulator, own_period)
     if hints.pulse and not has_pulse(declared):

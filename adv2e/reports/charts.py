@@ -271,13 +271,13 @@ def _percent(part: float, whole: float) -> str:
 # ---- Axes: from values to places in a picture, their ticks and labels, and how they are drawn.
 
 
-def log_ticks(low: float, high: float, most: int = 7) -> list[float]:
+def log_ticks(low: float, high: float) -> list[float]:
     """Return ticks of a logarithmic axis: powers of ten, with 2 and 5 times those if few.
 
-    At most `most` powers of ten; `low`, above zero, is below `high`.
+    At most seven powers of ten; `low`, above zero, is below `high`.
     """
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
-    every = max(1, math.ceil((last - first + 1) / most))
+    every = max(1, math.ceil((last - first + 1) / 7))
     decades = [n for n in range(first, last + 1) if n % every == 0]
     for exponents, digits in ((decades, (1,)), (range(first, last + 1), (1, 2, 5))):
         found = [float(f"{digit}e{n}") for n in exponents for digit in digits]

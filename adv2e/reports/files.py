@@ -6,7 +6,6 @@ A report that is not finished may always be replaced.
 from __future__ import annotations
 
 import json
-import math
 import os
 import tempfile
 import textwrap
@@ -159,8 +158,8 @@ def record(diagnosis: Diagnosis) -> dict[str, Any]:
     The keys up to ``signatures`` are what programs may rely on; those after it hold the rest of
     what the page shows.  Numbers are finite, or None.
     """
-    content = {**_fixed(diagnosis), **_further(diagnosis)}
-    finite: dict[str, Any] = _finite(native(content))
+    text = json.dumps({**_fixed(diagnosis), **_further(diagnosis)}, default=native)
+    finite: dict[str, Any] = json.loads(text, parse_constant=lambda constant: None)
     return finite
 
 
@@ -215,16 +214,6 @@ def _further(diagnosis: Diagnosis) -> dict[str, Any]:
         "label": report_of({}, diagnosis.notes),
         "facts": diagnosis.facts,
     }
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_finite(item) for item in value]
-    return value
 
 
 # ---- ``model.yaml``: the configuration found, with what is known of each key as comments.
@@ -291,14 +280,4 @@ def _lines(values: Mapping[str, Any], path: str, depth: int, comment: Comment) -
             yield f"{start}{comment(full)}"
             yield from _lines(value, full, depth + 1, comment)
         else:
-            yield f"{start} {_flow(value)}{comment(full)}"
-
-
-def _flow(value: Any) -> str:
-    if isinstance(value, dict):
-        return (
-            f"{{{', '.join(f'{scalar_text(key)}: {_flow(item)}' for key, item in value.items())}}}"
-        )
-    if isinstance(value, list):
-        return f"[{', '.join(_flow(item) for item in value)}]"
-    return scalar_text(value)
+            yield f"{start} {scalar_text(value)}{comment(full)}"

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from adv2e.config import Config, all_keys
-from adv2e.effects import EFFECTS, label_of
+from adv2e.effects import EFFECTS, Effect, label_of
 from adv2e.parameters import Parameter
 
 _NOT_IN_A_TEXT = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
@@ -248,14 +248,19 @@ def summary_of(name: str, paths: Sequence[str] = (), own: Own = NO_OWN) -> str:
     """Return in a line what the effect `name` is; if no module is called that, by its keys."""
     if name in own.summaries:
         return own.summaries[name]
-    for effect in EFFECTS:
-        if effect.name == name:
-            return effect.summary()
-    for effect in EFFECTS:
-        sections = tuple(f"{section}." for section in effect.paths)
-        if any(f"{path}.".startswith(sections) for path in paths):
-            return effect.summary()
-    return ""
+    of_keys = list(map(effect_of, paths))
+    found = [one for one in EFFECTS if one.name == name] or [
+        one for one in EFFECTS if one in of_keys
+    ]
+    return found[0].summary() if found else ""
+
+
+def effect_of(path: str) -> Effect | None:
+    """Return the effect that the key `path` belongs to."""
+    inside = f"{path}."
+    return next(
+        (one for one in EFFECTS if inside.startswith(tuple(f"{part}." for part in one.paths))), None
+    )
 
 
 # ---- Names of effects and their keys in sentences for people.

@@ -47,12 +47,12 @@ def number_text(value: float, digits: int = 3) -> str:
     return f"{mantissa}e{int(power)}"
 
 
-def alike_texts(values: Sequence[float], digits: int = 3) -> list[str]:
+def alike_texts(values: Sequence[float]) -> list[str]:
     """Return numbers to compare: all to the place of the last digit of the largest."""
     sizes = [abs(value) for value in values if math.isfinite(value) and value]
     if not sizes:
         return [number_text(value) for value in values]
-    place = min(_exponent(max(sizes), digits) - digits + 1, 0)
+    place = min(_exponent(max(sizes), 3) - 2, 0)
     return [_to_place(value, place) for value in values]
 
 

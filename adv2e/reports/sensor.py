@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from adv2e.config.tree import flat
-from adv2e.effects import EFFECTS, Effect
 from adv2e.reports import charts
 from adv2e.reports.charts import LEFT, LINE_HEIGHT, RIGHT, WIDTH, wrapped
-from adv2e.reports.markup import BUILT_IN, Column, Markup, join, table, tag, unit_of
+from adv2e.reports.markup import BUILT_IN, Column, Markup, effect_of, join, table, tag, unit_of
 from adv2e.reports.page import document
 from adv2e.reports.quantities import interval_text, number_text, value_text
 from adv2e.reports.result import Band
@@ -93,21 +92,17 @@ def _keys(sensor: Found) -> Markup:
     for path, value in flat(sensor["config"]):
         if value is None or not path.startswith(("pixel.", "readout.", "user.")):
             continue
-        effect = next((e.name for e in EFFECTS if f"{path}.".startswith(_sections(e))), "")
+        effect = effect_of(path)
         of = (one for one in sensor["numbers"] if path in one["keys"])
         texts = (f"{one['name']}, at {one['at']}: {number_of(one)}" for one in of)
         measured = [tag("span", text, class_="meaning") for text in texts]
         meaning = tag("span", BUILT_IN[path].meaning if path in BUILT_IN else "", class_="meaning")
-        command = tag("code", f"adv2e effects {effect}") if effect else ""
+        command = tag("code", f"adv2e effects {effect.name}") if effect else ""
         declared = f"{value_text(value)} {unit_of(path)}".rstrip()
         cell = tag("div", *measured or "-", class_="long")
         rows.append([join(path, meaning), declared, cell, command])
     heads = Column("key"), Column("declared", number=True), Column("measured"), Column("more")
     return table("of the pixel and the readout; effects that are off are left out", heads, rows)
-
-
-def _sections(effect: Effect) -> tuple[str, ...]:
-    return tuple(f"{section}." for section in effect.paths)
 
 
 def _figure(plots: Sequence[Found | None], names: Sequence[str]) -> Markup:

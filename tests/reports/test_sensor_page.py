@@ -4,7 +4,7 @@ import html
 import re
 
 import pytest
-from test_report_in_browser import CHROMIUM, browse
+from browser import browse, needs_a_browser
 
 from adv2e.reports.sensor import number_of, sensor_page
 
@@ -101,7 +101,7 @@ def test_numbers_say_how_well_they_are_known(given, text):
     assert number_of(given) == text
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
+@needs_a_browser
 @pytest.mark.parametrize("names", [["davis346"], ["a_long_name" * 6, *"bcdef"]])
 def test_nothing_is_wider_than_a_phone(names, tmp_path):
     script = (

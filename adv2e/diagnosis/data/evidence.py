@@ -16,7 +16,6 @@ from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.data.stimulus import Seen, Stimulus, joined
 from adv2e.effects.frames.encoding import LightDecoder
 from adv2e.errors import DataError
-from adv2e.events import Events
 from adv2e.files.regular import shown
 from adv2e.formats.reading import read_events
 from adv2e.geometry import Rectangle
@@ -154,6 +153,11 @@ class Evidence:
         before = replace(self.run_in, frames=of_part(self.run_in.frames))
         return replace(part, stimulus=seen, frames=of_part(self.frames), run_in=before)
 
+    def without(self, what: str, of: int | None = None) -> Evidence:
+        """Return the same with a note on what was set aside; `of`: events that there were."""
+        lost = 0.0 if of is None else 1.0 - len(self.stream) / of
+        return replace(self, masked=[*self.masked, Masked(what, lost)])
+
     def with_frames(self, changed: Callable[[NDArray[Any]], NDArray[Any]]) -> Evidence:
         before = replace(self.run_in, frames=[changed(one) for one in self.run_in.frames])
         return replace(self, frames=[changed(one) for one in self.frames], run_in=before)
@@ -235,10 +239,7 @@ def read_evidence(path: str | Path, sensor: Sensor | None = None, **reading: Any
         notes=list(recording.problems),
         white=white,
     )
-    first, last, text = covered(kept, times_s)
-    if not text:
-        return whole
-    return replace(whole.during(first, last), masked=[*masked, Masked(text, 0.0)])
+    return of_covered_time(whole, kept["t"])
 
 
 def part_of(
@@ -278,8 +279,7 @@ def part_of(
     if part is evidence:
         return evidence
     check_events(len(part.stream), name, "in the part that is asked for")
-    lost = 1.0 - len(part.stream) / len(evidence.stream)
-    return replace(part, masked=[*part.masked, Masked("all but the part asked for", lost)])
+    return part.without("all but the part asked for", of=len(evidence.stream))
 
 
 def _check_alike(path: str | Path, frames: list[NDArray[Any]]) -> None:
@@ -305,20 +305,22 @@ def check_events(number: int, name: object, where: str) -> None:
         raise DataError(f"{name}: {number} events {where}; at least {LEAST_EVENTS} are needed")
 
 
-def covered(events: Events, times_s: NDArray[np.float64]) -> tuple[int, int, str]:
-    """Return the first and the last frame of the time that the events cover, and what they do not.
+def of_covered_time(whole: Evidence, t_us: NDArray[np.int64]) -> Evidence:
+    """Return a recording without time at its ends that its events, at `t_us`, do not cover.
 
     Streams are often cut, or begin late; what no event was kept of did not happen without any.
     """
+    times_s, t_s = whole.times_s, t_us * 1e-6
     first, last = 0, len(times_s) - 1
-    t_s = events["t"] * 1e-6
     usual = max(_UNCOVERED * float(np.diff(t_s).max()), 2.0 * float(np.diff(times_s).max()))
     if t_s[0] - times_s[0] > usual:
         first = int(np.searchsorted(times_s, t_s[0], "right")) - 1
     if times_s[-1] - t_s[-1] > usual:
         last = int(np.searchsorted(times_s, t_s[-1]))
     ends = (times_s[first] - times_s[0], "first"), (times_s[-1] - times_s[last], "last")
-    which = [f"{time:.3g} s at the {end} frames" for time, end in ends if time > 0.0]
+    shown = "frames" if whole.stimulus is None else "instants"
+    which = [f"{time:.3g} s at the {end} {shown}" for time, end in ends if time > 0.0]
     if last - first < 2 or not which:
-        return 0, len(times_s) - 1, ""
-    return first, last, f"{' and '.join(which)}, which the events do not cover"
+        return whole
+    part = whole.during(first, last)
+    return part.without(f"{' and '.join(which)}, which the events do not cover")

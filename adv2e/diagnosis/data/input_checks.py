@@ -27,23 +27,25 @@ def check_inputs(measured: Placed, scene: Scene, light: NDArray[np.float32]) -> 
 
     From its events, and the light of its frames [DN], (frames, rows, columns).
     """
-    found = [
-        _brightness(light), *_gaps(scene.times_us), *_unseen(measured, scene),
-        _direction(measured, scene),
-    ]  # fmt: skip
-    return [line for line in found if line]
+    dark = _brightness(
+        light,
+        "the frames are all the same: nothing that moves can be simulated from them, so only noise"
+        " can be judged",
+        "the brightest light of the frames is {:.2g} of white: is frames.full_scale right?",
+    )
+    found = [*dark[:1], *_gaps(scene.times_us), *_unseen(measured, scene)]
+    direction = _direction(measured, scene)
+    return [*found, direction] if direction else found
 
 
 def check_known_light(measured: Placed, scene: Scene, light: NDArray[np.float32]) -> list[str]:
     """Return warnings about a recording of known light, as :func:`check_inputs` does."""
-    found, brightest = [], float(light.max()) / _WHITE_DN
-    if np.all(light == light[0]):
-        found.append("the light never changes: it tells of noise, and of nothing else")
-    if brightest < _DIM:
-        found.append(
-            f"the brightest light is {brightest:.2g} of white: is its unit right? light_dn has 255"
-            " for white, light has 1"
-        )
+    found = _brightness(
+        light,
+        "the light never changes: it tells of noise, and of nothing else",
+        "the brightest light is {:.2g} of white: is its unit right? light_dn has 255 for white,"
+        " light has 1",
+    )
     if _direction(measured, scene).startswith("ON"):
         found.append(
             "ON events come where the light falls: are polarities, or the light, inverted?"
@@ -51,19 +53,11 @@ def check_known_light(measured: Placed, scene: Scene, light: NDArray[np.float32]
     return found
 
 
-def _brightness(light: NDArray[np.float32]) -> str:
+def _brightness(light: NDArray[np.float32], is_still: str, is_dim: str) -> list[str]:
+    """Return what to say of light that never changes, and of light that is dim."""
     brightest = float(light.max()) / _WHITE_DN
-    if np.all(light == light[0]):
-        return (
-            "the frames are all the same: nothing that moves can be simulated from them, so only"
-            " noise can be judged"
-        )
-    if brightest < _DIM:
-        return (
-            f"the brightest light of the frames is {brightest:.2g} of white: is"
-            " frames.full_scale right?"
-        )
-    return ""
+    found = [is_still] if np.all(light == light[0]) else []
+    return [*found, is_dim.format(brightest)] if brightest < _DIM else found
 
 
 def _gaps(times_us: NDArray[np.float64]) -> list[str]:

@@ -16,18 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e import __version__
 from adv2e.config import Config
-from adv2e.diagnosis.configurations import (
-    as_found,
-    declared_of,
-    defaults_of,
-    of_frames_again,
-    of_known_light,
-    own_of,
-)
+from adv2e.diagnosis.configurations import of_known_light, own_of
 from adv2e.diagnosis.data.evidence import Evidence
-from adv2e.diagnosis.data.scene import Placed, Scene
+from adv2e.diagnosis.data.scene import Scene
 from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.diagnose import diagnose
 from adv2e.diagnosis.film.fitting import FilmFitter, Place, first_point
@@ -37,19 +29,19 @@ from adv2e.diagnosis.film.registration import first_delays, first_view, rests
 from adv2e.diagnosis.film.selection import FilmSearch, Step
 from adv2e.diagnosis.film.view import UNKNOWNS, Films, View
 from adv2e.diagnosis.fitting.candidates import NOTHING
-from adv2e.diagnosis.fitting.fitter import threshold_nuisance, thresholds_of
+from adv2e.diagnosis.fitting.fitter import threshold_nuisance
 from adv2e.diagnosis.fitting.library import OF_FRAMES, library
 from adv2e.diagnosis.hints.collect import Hints
 from adv2e.diagnosis.hints.stamps import double_reads
-from adv2e.diagnosis.outcome.findings import finding_of
+from adv2e.diagnosis.outcome.findings import Given, facts_of
 from adv2e.diagnosis.outcome.picture import pictures_of
+from adv2e.diagnosis.simulation.simulator import Progress
 from adv2e.effects import label_of
 from adv2e.reports.result import Diagnosis, ErrorRow, Estimate, SceneNumber, Verdict
 
-_NOT_TRIED = (
-    *(*OF_FRAMES, "clock_offset", "clock_drift", "initial_reference"),
-    *("readout", "timestamp_tick"),
-)
+_NOT_TRIED = {
+    *OF_FRAMES, "clock_offset", "clock_drift", "initial_reference", "readout", "timestamp_tick",
+}  # fmt: skip
 """Effects that the view stands for, or that recordings side by side cannot show."""
 _DRAWS = 6
 _ROUNDS = 25
@@ -91,9 +83,9 @@ def _before_a_video(
     **options: Any,
 ) -> Diagnosis:
     """Fit the view of a video, and search as with frames."""
-    telling = _Telling(progress)
+    telling = Progress(progress)
     keys = threshold_nuisance(declared) if free_thresholds else NOTHING
-    fitter = FilmFitter(recordings.films, recordings.stream(), threads, telling.count)
+    fitter = FilmFitter(recordings.films, recordings.stream, threads, telling.count)
     telling.begin("fitting the view of the film")
     base = of_known_light(declared)
     start = first_view(recordings.films, fitter.measured)
@@ -127,20 +119,20 @@ def _before_pictures(
 ) -> Diagnosis:
     """Fit views and effects to half of the recordings, and judge them by the others."""
     began = time.perf_counter()
-    telling = _Telling(progress)
+    telling = Progress(progress)
     given, declared = declared, of_known_light(declared)
     fitter, judge = halves_of(recordings, threads, telling.count)
+    pixels = judge.measured.width * judge.measured.height
+    known_before = Given(given, written, free_thresholds, pixels, is_light=True)
     nuisances = threshold_nuisance(declared) if free_thresholds else NOTHING
     search = FilmSearch(fitter, judge, nuisances, threads, log, telling.begin)
     telling.begin("finding where the camera looked")
     first = search.start(first_view(fitter.films, fitter.measured), declared)
-    free = {parameter.key for parameter in nuisances.parameters}
-    hints = Hints(1.0, (), 1, double_read=double_reads(recordings.stream()))
+    hints = Hints(1.0, (), 1, double_read=double_reads(recordings.stream))
     candidates = [
         one
         for one in library(declared, hints)
-        if one.name not in (*without, *_NOT_TRIED)
-        and not free & {each.key for each in one.parameters}
+        if one.name not in {*without, *_NOT_TRIED} and not nuisances.keys & one.keys
     ]
 
     def facts() -> dict[str, str]:
@@ -148,10 +140,7 @@ def _before_pictures(
             "sensor": str(recordings.films.size),
             "recordings": f"{len(recordings.events):,}",
             "events": f"{sum(map(len, recordings.events)):,}",
-            "simulations": f"{telling.done:,}",
-            "seed": str(declared.seed),
-            "time taken": f"{time.perf_counter() - began:.0f} s",
-            "adv2e": __version__,
+            **facts_of(telling.done, declared.seed, began),
         }
 
     def told(steps: Sequence[Step]) -> Diagnosis:
@@ -163,8 +152,7 @@ def _before_pictures(
             late_us=_interleaved(fitter.delays_us, judge.delays_us),
             recording=name,
             declared=declared_name,
-            given=given,
-            written=written,
+            given=known_before,
             notes=[*recordings.notes, _about(recordings)],
         )
         if known is not None:
@@ -189,32 +177,17 @@ def halves_of(
     recordings: FilmRecordings, threads: int, count: Callable[[], None] = lambda: None
 ) -> tuple[FilmFitter, FilmFitter]:
     """Return fitters of the recordings that are fitted to and of those that judge, on one clock."""
-    stream, number = recordings.stream(), len(recordings.events)
+    stream, number = recordings.stream, len(recordings.events)
     delays_us = first_delays(stream, number)
     rests_us = rests(stream, number, delays_us)
     late_us = np.tile(delays_us[:, None], len(rests_us) + 1)
     fitters = []
     for k in (0, 1):
         half = recordings.every_second(k)
-        fitter = FilmFitter(half.films, half.stream(), threads, count, rests_us)
+        fitter = FilmFitter(half.films, half.stream, threads, count, rests_us)
         fitter.shift_us(late_us[k::2])
         fitters.append(fitter)
     return fitters[0], fitters[1]
-
-
-class _Telling:
-    """Counts simulations, and tells of them and of stages."""
-
-    def __init__(self, progress: Callable[[str, int], None]) -> None:
-        self._progress, self._stage, self.done = progress, "", 0
-
-    def begin(self, stage: str) -> None:
-        self._stage = stage
-        self._progress(stage, self.done)
-
-    def count(self) -> None:
-        self.done += 1
-        self._progress(self._stage, self.done)
 
 
 def _about(recordings: FilmRecordings) -> str:
@@ -231,38 +204,30 @@ def _diagnosis(
     judge: FilmFitter,
     *,
     late_us: NDArray[np.float64],
-    given: Config,
-    written: Collection[str] | None,
+    given: Given,
     **about: Any,
 ) -> Diagnosis:
     first, last = steps[0], steps[-1]
     verdict, remark = _verdict(first, last)
     config, films = last.place.config, judge.films
-    pixels = len(films.pictures) * films.size.width * films.size.height
-    effects = [finding_of(fit, pixels, config) for fit in search.fits(last)]
-    nuisances = thresholds_of(config) if search.has_nuisances else {}
-    keys = (key for one in effects for key in one.parameters)
-    held = declared_of(given, [*nuisances, *keys])
     streams = [
         judge.streams(step.place.view, step.place.config, range(_FIRST_DRAW, _FIRST_DRAW + _DRAWS))
         for step in (first, last)
     ]
+    evidence = evidence_of(films, last.place.view, judge.measured, "")
+    scene = Scene.of_evidence(evidence, config)
     return Diagnosis(
         verdict=verdict,
         remark=remark,
-        effects=effects,
-        nuisances=nuisances,
+        **given.told(config, search.fits(last)),
         rejected=list(search.rejected.values()),
         errors=_errors(first, last, streams, judge),
         global_p_before=first.probability,
         global_p_after=last.probability,
         split="every second recording is fitted to, from the first; the others judge",
-        model=as_found(of_frames_again(config, given)),
         own=own_of(config),
-        declared_values=held,
-        defaults=defaults_of(held, written),
         view=[*_fitted_view(last.place.view, films), _late(late_us)],
-        **_pictures(last, judge, streams),
+        **pictures_of(scene, evidence.stream, *streams),
         **about,
     )
 
@@ -311,14 +276,6 @@ def _errors(
         )
         rows.append(ErrorRow(name, before, after, between))
     return rows
-
-
-def _pictures(last: Step, judge: FilmFitter, streams: Sequence[Sequence[Stream]]) -> dict[str, Any]:
-    evidence = evidence_of(judge.films, last.place.view, judge.measured, "")
-    scene = Scene.of_evidence(evidence, last.place.config)
-    measured = Placed.of(evidence.stream, scene)
-    before, after = ([Placed.of(one, scene) for one in side] for side in streams)
-    return pictures_of(scene, measured, before, after)
 
 
 def evidence_of(films: Films, view: View, stream: Stream, name: str) -> Evidence:

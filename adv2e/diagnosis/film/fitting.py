@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from adv2e.config import Config
 from adv2e.diagnosis.data.splits import Stream
-from adv2e.diagnosis.film.residual import Counting, Numbers
+from adv2e.diagnosis.film.residual import Counting, Numbers, places_of
 from adv2e.diagnosis.film.view import KNOT_NS, UNKNOWNS, Films, Unknown, View
 from adv2e.diagnosis.fitting.candidates import Candidate
 from adv2e.diagnosis.simulation.affordable import FINE
@@ -96,14 +96,15 @@ class FilmFitter:
         self.counting = Counting(width, height, len(films.pictures), (first, last))
         self._span_us = first, last
         self._as_read = measured
-        self._recorded_us = _recorded(measured.t, self._number(measured), len(films.pictures))
+        number, _, _ = places_of(measured, len(films.pictures))
+        self._recorded_us = _recorded(measured.t, number, len(films.pictures))
         self.rests_us = np.asarray(rests_us, np.float64)
         self.shift_us(np.zeros((len(films.pictures), len(rests_us) + 1)))
 
     def shift_us(self, delays_us: Array) -> None:
         """Take each motion of each recording to be late by so much, (recordings, motions) [us]."""
         stream, self.delays_us = self._as_read, delays_us
-        number = self._number(stream)
+        number, _, _ = places_of(stream, len(self.films.pictures))
         motion = np.searchsorted(self.rests_us, stream.t - delays_us.mean(axis=1)[number])
         t = stream.t - np.rint(delays_us).astype(np.int64)[number, motion]
         order = np.argsort(t, kind="stable")
@@ -155,12 +156,8 @@ class FilmFitter:
     def recorded(self, stream: Stream) -> Stream:
         """Return those events of all recordings side by side that are of the time of each."""
         begin, end = (self._recorded_us - self.delays_us[:, [0, -1]]).T
-        number = self._number(stream)
+        number, _, _ = places_of(stream, len(self.films.pictures))
         return stream.chosen((stream.t >= begin[number]) & (stream.t <= end[number]))
-
-    def _number(self, stream: Stream) -> NDArray[np.intp]:
-        """Return which recording each event is of."""
-        return np.asarray(stream.pixel % stream.width // self.films.size.width)
 
     def residual(self, view: View, config: Config, seeds: Sequence[int] = SEEDS) -> list[Numbers]:
         """Return simulated less measured numbers, one for each seed."""
@@ -213,7 +210,7 @@ class _Column:
     """Derivative by one number, of each seed, in some bins."""
 
     by_seed: tuple[Numbers, ...]
-    bins: slice = field(default_factory=lambda: _ALL)
+    bins: slice
 
 
 class _Descent:
@@ -266,13 +263,12 @@ class _Descent:
 
     def _columns(self, place: Place, here: list[Numbers]) -> list[_Column]:
         """Return the derivatives by all free numbers: of the view, of the camera, of the path."""
-        view, places, steps = place.view, [], []
+        view, moves = place.view, list[tuple[Place, float]]()
         for one in self._free:
             value, step = getattr(view, one.name), one.step
             if one.moved(value, step) == value:
                 step = -step
-            places.append(replace(place, view=view.moved(one, step)))
-            steps.append(step)
+            moves.append((replace(place, view=view.moved(one, step)), step))
         parameters = place.keys.parameters
         for k, parameter in enumerate(parameters):
             step = _STEP
@@ -280,17 +276,14 @@ class _Descent:
                 step = -step
             point = place.point.copy()
             point[k] += step
-            places.append(replace(place, point=point))
-            steps.append(step)
+            moves.append((replace(place, point=point), step))
         groups = [(axis, k) for axis in (0, 1) for k in range(min(_APART, len(view.path)))]
         for axis, k in groups if self._path else ():
             path = view.path.copy()
             path[k::_APART, axis] += _STEP_PX
-            places.append(replace(place, view=replace(view, path=path)))
-            steps.append(_STEP_PX)
-        pairs = zip(places, steps, strict=True)
-        slopes = list(self._pool.map(lambda pair: self._slope_by(here, *pair), pairs))
-        columns = [_Column(one) for one in slopes[: len(self._free) + len(parameters)]]
+            moves.append((replace(place, view=replace(view, path=path)), _STEP_PX))
+        slopes = list(self._pool.map(lambda move: self._slope_by(here, *move), moves))
+        columns = [_Column(one, _ALL) for one in slopes[: len(self._free) + len(parameters)]]
         if self._path:
             columns += self._of_the_path(dict(zip(groups, slopes[len(columns) :], strict=True)))
         return columns
@@ -342,17 +335,11 @@ class _Descent:
             at += 1
         keys = len(place.keys.parameters)
         point = place.point + np.clip(step[at : at + keys], -_LARGEST, _LARGEST)
-        point = np.array(
-            [
-                one.scaled(one.value_at(x))
-                for one, x in zip(place.keys.parameters, point, strict=True)
-            ]
-        )
         if self._path:
             moves = np.clip(step[at + keys :], -_LARGEST_PX, _LARGEST_PX).reshape(2, -1).T
             reach = self._fitter.films.reach_px
             view = replace(view, path=np.clip(view.path + moves, -reach, reach))
-        return replace(place, view=view, point=point)
+        return replace(place, view=view, point=place.keys.inside(point))
 
 
 def _bend(view: View) -> Array:

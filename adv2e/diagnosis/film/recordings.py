@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -49,8 +50,9 @@ class FilmRecordings:
     events: Sequence[Events]
     notes: list[str]
 
+    @cached_property
     def stream(self) -> Stream:
-        """Return the events of all recordings, side by side on one wide sensor."""
+        """Events of all recordings, side by side on one wide sensor."""
         width, height = self.films.size
         parts = []
         for number, events in enumerate(self.events):
@@ -117,7 +119,6 @@ def read_recordings(
         events.append(recording.events)
         notes += [one for one in recording.problems if "frame" not in one]
     check_events(sum(map(len, events)), pairs[0][0], "in all recordings")
-    made: dict[Path, NDArray[np.float32]] = {}
     if not all(Path(film).suffix.lower() in IMAGE_SUFFIXES for _, film in pairs):
         if len(pairs) > 1:
             raise DataError(
@@ -131,9 +132,8 @@ def read_recordings(
             f"{len(pairs)} recordings before pictures: at least {LEAST} are needed, as half of them"
             " judge what the others were fitted to"
         )
-    for _, film in pairs:
-        if Path(film) not in made:
-            made[Path(film)] = _numbers(read_image(Path(film)))[None]
+    seen = dict.fromkeys(Path(film) for _, film in pairs)
+    made = {film: _numbers(read_image(film))[None] for film in seen}
     films = Films([made[Path(film)] for _, film in pairs], _instants(events, pairs), sizes[0])
     return FilmRecordings(films, events, list(dict.fromkeys(notes)))
 

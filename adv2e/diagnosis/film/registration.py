@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adv2e.diagnosis.data.splits import Stream
+from adv2e.diagnosis.film.residual import places_of
 from adv2e.diagnosis.film.view import KNOT_NS, Films, View
 
 Array = NDArray[np.float64]
@@ -38,7 +39,7 @@ def first_delays(stream: Stream, recordings: int) -> Array:
 
     Each course is moved along the mean of all others', in turn until none moves any more.
     """
-    number = stream.pixel % stream.width // (stream.width // recordings)
+    number, _, _ = places_of(stream, recordings)
     first, last = int(stream.t[0]), int(stream.t[-1])
     bins = (last - first) // _COURSE_US + 1
     place = number * bins + (stream.t - first) // _COURSE_US
@@ -65,7 +66,7 @@ def rests(stream: Stream, recordings: int, delays_us: Array) -> list[float]:
 
     There hardly anything is seen, less than a share of what there is at most times.
     """
-    number = stream.pixel % stream.width // (stream.width // recordings)
+    number, _, _ = places_of(stream, recordings)
     t = stream.t - delays_us[number]
     bins = np.arange(t.min(), t.max() + 2 * _COURSE_US, _COURSE_US)
     rate = np.convolve(np.histogram(t, bins)[0], np.ones(_LASTS) / _LASTS, "same")
@@ -123,8 +124,7 @@ def _slopes(films: Films, view: View, offset: Array) -> Array:
 def _signed(films: Films, stream: Stream, recordings: int) -> Array:
     """Return ON less OFF events, smoothed, (recordings, rows, columns), of the first recordings."""
     width, height = films.size
-    y, x = np.divmod(stream.pixel, width * recordings)
-    number, x = np.divmod(x, width)
+    number, y, x = places_of(stream, recordings)
     inside = number < len(films.pictures)
     signed = np.zeros((len(films.pictures), height, width))
     sign = 2.0 * stream.on[inside] - 1.0

@@ -65,6 +65,13 @@ class Numbers:
         return np.asarray(found)
 
 
+def places_of(stream: Stream, recordings: int) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Return recording, row and column of each event of recordings side by side."""
+    y, x = np.divmod(stream.pixel, stream.width)
+    number, x = np.divmod(x, stream.width // recordings)
+    return number, y, x
+
+
 class Counting:
     """Turns the events of recordings side by side into :class:`Numbers`.
 
@@ -90,8 +97,7 @@ class Counting:
 
     def numbers(self, stream: Stream) -> Numbers:
         """Return the numbers of a stream of all recordings, (recordings * width) columns wide."""
-        y, x = np.divmod(stream.pixel, self._width * self._recordings)
-        number, x = np.divmod(x, self._width)
+        number, y, x = places_of(stream, self._recordings)
         bins = np.searchsorted(self.borders_us, stream.t, "right") - 1
         bins = np.clip(bins, 0, self.bins - 1)
         cells = self._cells((number, stream.on, bins, y // self._size, x // self._size))

@@ -21,7 +21,7 @@ from adv2e.config import Config
 from adv2e.diagnosis.film.fitting import FilmFitter, Place, first_point
 from adv2e.diagnosis.film.view import View
 from adv2e.diagnosis.fitting.candidates import Candidate
-from adv2e.diagnosis.fitting.fitted import Fitted
+from adv2e.diagnosis.fitting.fitted import Fitted, parted
 from adv2e.effects import label_of
 from adv2e.reports.result import Rejected
 
@@ -128,7 +128,8 @@ class FilmSearch:
         tried = [(one, start) for one in open_ for start in one.starts]
         places = [self._with(step, one, start) for one, start in tried]
         with ThreadPoolExecutor(self._threads) as pool:
-            misfits = list(pool.map(self._rough, places))
+            rough = pool.map(lambda at: self._fitter.residual(at.view, at.config), places)
+            misfits = [first.times(second) for first, second in rough]
         best: dict[str, tuple[float, Candidate, Place]] = {}
         for (one, _), place, misfit in zip(tried, places, misfits, strict=True):
             if one.name not in best or misfit < best[one.name][0]:
@@ -197,10 +198,6 @@ class FilmSearch:
         keys = Candidate.joined([place.keys, one])
         return replace(place, keys=keys, point=np.concatenate([place.point, one.scaled(start)]))
 
-    def _rough(self, place: Place) -> float:
-        first, second = self._fitter.residual(place.view, place.config)
-        return first.times(second)
-
     def _judged(self, place: Place, effects: tuple[Candidate, ...]) -> Step:
         each = self._judge.each(place.view, place.config, _JUDGED)
         floors = []
@@ -214,15 +211,11 @@ class FilmSearch:
 
     def fits(self, step: Step) -> tuple[Fitted, ...]:
         """Return the effects of a step as fits, each with its covariance."""
-        covariance = self._fitter.covariance(step.place, step.error + 1.0)
-        found, at = [], len(self._nuisances.parameters)
-        for one in step.effects:
-            own = slice(at, at + len(one.parameters))
-            found.append(
-                Fitted(one, step.place.base, step.place.point[own], covariance=covariance[own, own])
-            )
-            at = own.stop
-        return tuple(found)
+        place, every = step.place, (self._nuisances, *step.effects)
+        covariance = self._fitter.covariance(place, step.error + 1.0)
+        joint = Fitted(place.keys, place.base, place.point, covariance=covariance)
+        fits = parted(joint, tuple(Fitted(one, place.base, place.point) for one in every))
+        return fits[1:]
 
 
 def _sureness(gain: Array) -> float:

@@ -147,12 +147,22 @@ class Candidate:
         )
 
     @property
+    def keys(self) -> set[str]:
+        """Keys that are fitted."""
+        return {one.key for one in self.parameters}
+
+    @property
     def known_or_not(self) -> tuple[tuple[float, float], ...]:
         """Prior of every parameter: `known`, or :data:`NOTHING_KNOWN` for each."""
         return self.known or (NOTHING_KNOWN,) * len(self.parameters)
 
     def scaled(self, values: Sequence[float]) -> list[float]:
         return [one.scaled(value) for one, value in zip(self.parameters, values, strict=True)]
+
+    def inside(self, point: Point) -> NDArray[np.float64]:
+        """Return the physical point that is nearest."""
+        pairs = zip(self.parameters, point, strict=True)
+        return np.array([one.scaled(one.value_at(at)) for one, at in pairs])
 
     def applied(self, config: Config, point: Point) -> Config:
         values = to_dict(config)

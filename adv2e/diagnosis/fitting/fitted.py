@@ -77,10 +77,7 @@ class Fitted:
         return self.candidate.settings_in(self.config, self.point)
 
     def inside(self, point: Array) -> Array:
-        parameters = self.candidate.parameters
-        return np.array(
-            [one.scaled(one.value_at(at)) for one, at in zip(parameters, point, strict=True)]
-        )
+        return self.candidate.inside(point)
 
     @property
     def certainty(self) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -84,34 +84,31 @@ def hints_of(
         return scene.split.chosen(stream, splits.TRAIN)
 
     stream = evidence.stream
-    too_many = _too_many(stream, pilot, 1), _too_many(stream, pilot, 0)
+    hints = Hints(
+        evidence.seconds,
+        (),
+        tick_of(stream.t),
+        service=service_times(stream),
+        double_read=double_reads(stream),
+        too_many=(_too_many(stream, pilot, 1), _too_many(stream, pilot, 0)),
+    )
     if evidence.stimulus is not None:  # no lamp that it does not tell, no frame that is read out
         apart = stream.since[stream.since >= 0]
-        return Hints(
-            evidence.seconds,
-            (),
-            tick_of(stream.t),
-            service=service_times(stream),
-            double_read=double_reads(stream),
-            too_many=too_many,
-            shortest_us=float(np.quantile(apart, _HARDLY_ANY)) if len(apart) else None,
-        )
+        shortest_us = float(np.quantile(apart, _HARDLY_ANY)) if len(apart) else None
+        return replace(hints, shortest_us=shortest_us)
     looked_at = train_and_validation_events(evidence, scene)
     lines = strongest_lines(train(stream), list(map(train, pilot)), scene)
     lamps = lamps_of(
         lines, train(stream), declared, lambda lit: train(simulator.stream(lit, _LAMP_SEED))
     )
-    return Hints(
-        evidence.seconds,
-        tuple(lamps),
-        tick_of(stream.t),
-        evidence.encoding,
-        service_times(stream),
-        readouts_of(looked_at, evidence.times_s),
-        None if own_period else pulse_of(looked_at, evidence.times_s, evidence.before_s),
-        own_period,
-        too_many,
-        double_reads(stream),
+    pulse = None if own_period else pulse_of(looked_at, evidence.times_s, evidence.before_s)
+    return replace(
+        hints,
+        lamps=tuple(lamps),
+        encoding=evidence.encoding,
+        readouts=readouts_of(looked_at, evidence.times_s),
+        pulse=pulse,
+        own_period=own_period,
     )
 
 

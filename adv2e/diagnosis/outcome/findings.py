@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+import time
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from adv2e import __version__
 from adv2e.config import Config
-from adv2e.diagnosis.configurations import with_keys
+from adv2e.diagnosis.configurations import (
+    as_found,
+    declared_of,
+    defaults_of,
+    of_frames_again,
+    with_keys,
+)
 from adv2e.diagnosis.data import splits
 from adv2e.diagnosis.data.evidence import Evidence
 from adv2e.diagnosis.fitting.candidates import Candidate
 from adv2e.diagnosis.fitting.fitted import Fitted
+from adv2e.diagnosis.fitting.fitter import thresholds_of
 from adv2e.diagnosis.prepare import Prepared
 from adv2e.diagnosis.selection.reference import Reference, State
 from adv2e.diagnosis.selection.search import Outcome
@@ -50,6 +59,53 @@ def finding_of(fit: Fitted, pixels: int, config: Config) -> Finding:
     for key, sd in fit.candidate.read_off:
         interval[key] = settings[key] - 1.96 * sd, settings[key] + 1.96 * sd
     return Finding(fit.candidate.name, settings, interval)
+
+
+@dataclass(frozen=True)
+class Given:
+    """What was given of a camera and its recording, beside which models are told.
+
+    Attributes
+    ----------
+    declared : Config
+        As it was given.
+    written, free_thresholds
+        As :func:`adv2e.diagnosis.diagnose.diagnose` takes them.
+    pixels : int
+        Of the recording.
+    is_light : bool
+        Light is known, so that models are without sections of frames.
+    """
+
+    declared: Config
+    written: Collection[str] | None
+    free_thresholds: bool
+    pixels: int
+    is_light: bool
+
+    def told(self, config: Config, fits: Sequence[Fitted] = ()) -> dict[str, Any]:
+        """Return what a diagnosis says of a model, by the names of its attributes."""
+        effects = [finding_of(fit, self.pixels, config) for fit in fits]
+        nuisances = thresholds_of(config) if self.free_thresholds else {}
+        keys = (key for one in effects for key in one.parameters)
+        held = declared_of(self.declared, [*nuisances, *keys])
+        return {
+            "effects": effects,
+            "nuisances": nuisances,
+            "declared_values": held,
+            "defaults": defaults_of(held, self.written),
+            "model": as_found(of_frames_again(config, self.declared) if self.is_light else config),
+        }
+
+
+def facts_of(simulations: int, seed: int, began_s: float) -> dict[str, str]:
+    """Return the facts that every diagnosis ends in; `began_s`: by :func:`time.perf_counter`."""
+    return {
+        "simulations": f"{simulations:,}",
+        "seed": str(seed),
+        "time taken": f"{time.perf_counter() - began_s:.0f} s",
+        "adv2e": __version__,
+    }
 
 
 def rejected_of(
@@ -92,8 +148,7 @@ def _alone(one: Rejected, declared: Config, candidates: Sequence[Candidate]) -> 
     Values that were fitted beside another effect may not be allowed without it.
     """
     for candidate in candidates:
-        keys = {parameter.key for parameter in candidate.parameters}
-        if candidate.name == one.name and keys <= set(one.parameters):
+        if candidate.name == one.name and candidate.keys <= set(one.parameters):
             try:
                 whole = candidate.applied(declared, candidate.scaled(candidate.starts[0]))
                 return with_keys(whole, one.parameters)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from adv2e.diagnosis.data.scene import (
     Placed,
     Scene,
 )
+from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.data.stimulus import Leaps
 from adv2e.diagnosis.statistics.groups import excess
 from adv2e.diagnosis.statistics.rates import by_load, rate_hz
@@ -67,11 +69,16 @@ class _Axes:
 
 
 def pictures_of(
-    scene: Scene, measured: Placed, before: Sequence[Placed], after: Sequence[Placed]
+    scene: Scene, measured: Stream, before: Sequence[Stream], after: Sequence[Stream]
 ) -> dict[str, Any]:
-    """Return all of the picture, by the names of a diagnosis; arguments as of :func:`curves_of`."""
+    """Return all of the picture, by the names of a diagnosis.
+
+    `before` and `after` are simulations of the declared model and of the model found.
+    """
+    placed = Placed.of(measured, scene)
+    first, second = ([Placed.of(one, scene) for one in some] for some in (before, after))
     kinds = {"curves": curves_of, "maps": maps_of, "totals": totals_of, "snapshot": snapshot_of}
-    return {name: kind(scene, measured, before, after) for name, kind in kinds.items()}
+    return {name: kind(scene, placed, first, second) for name, kind in kinds.items()}
 
 
 def curves_of(
@@ -191,15 +198,25 @@ def _band(rows: Sequence[Array]) -> Band:
 def _between_events() -> Iterator[_Axes]:
     for kind, same in (("same", True), ("other", False)):
         title, label = f"a pixel, {kind} polarity", "the event before [ms]"
-        yield _times(title, label, _GAPS_MS, _gaps(same))
+        yield _times(title, label, _GAPS_MS, partial(_gaps, same=same))
     for kind, same in (("same", True), ("other", False)):
         title, label = f"the sensor, {kind} row", "the event before, of any pixel [µs]"
-        yield _times(title, label, _STAMPS_US, _stamps(same))
+        yield _times(title, label, _STAMPS_US, partial(_stamps, same=same))
 
 
-def _times(of: str, since: str, borders: Array, measure: Measure) -> _Axes:
-    title, label = f"Time between events of {of}", f"time since {since}"
-    return _Axes(title, label, "events in a bin", borders, measure, x_log=True)
+def _times(of: str, since: str, borders: Array, values: Measure) -> _Axes:
+    return _in_bins(f"Time between events of {of}", f"time since {since}", borders, values)
+
+
+def _in_bins(
+    title: str, label: str, borders: Array, values: Measure, *, x_log: bool = True
+) -> _Axes:
+    """Return axes for the number of events by a value of each."""
+
+    def measure(placed: Placed) -> Array:
+        return np.histogram(values(placed), borders)[0].astype(np.float64)
+
+    return _Axes(title, label, "events in a bin", borders, measure, x_log)
 
 
 def _by_place(scene: Scene) -> Iterator[_Axes]:
@@ -251,20 +268,22 @@ def _by_time(scene: Scene, before: Sequence[Placed]) -> Iterator[_Axes]:
     if scene.leaps is not None:
         for name, on in _POLARITIES:
             title, label = f"Events after a leap of the light, {name}", "time since the leap [ms]"
-            measure = _since_leap(scene.leaps, on)
-            yield _Axes(title, label, "events in a bin", _SINCE_LEAP_MS, measure, x_log=True)
+            yield _in_bins(
+                title, label, _SINCE_LEAP_MS, partial(_since_leap, leaps=scene.leaps, on=on)
+            )
     else:
         for text, moving in _MOTION:
             title, label = f"Place between two frames, {text}", "place [% of the frame interval]"
-            yield _Axes(title, label, "events in a bin", _PHASES, _phases(scene, moving))
+            values = partial(_phases, scene=scene, moving=moving)
+            yield _in_bins(title, label, _PHASES, values, x_log=False)
     borders_s = np.linspace(0.0, float(scene.seconds.sum()), 25)
-    yield _Axes(
-        "Events over time",
-        "time after the start [s]",
-        _PER_SENSOR,
-        borders_s,
-        _course(scene, borders_s),
-    )
+    start, width = scene.times_us[0], borders_s[1] - borders_s[0]
+
+    def course(placed: Placed) -> Array:
+        number, _ = np.histogram((placed.stream.t - start) * 1e-6, borders_s)
+        return np.asarray(number / width)
+
+    yield _Axes("Events over time", "time after the start [s]", _PER_SENSOR, borders_s, course)
 
 
 def contrast(scene: Scene) -> NDArray[np.float32]:
@@ -285,28 +304,31 @@ def contrast(scene: Scene) -> NDArray[np.float32]:
     return high - low
 
 
-def _gaps(same: bool) -> Measure:
-    """Count times between events of a pixel, of the same or of the other polarity."""
-
-    def measure(placed: Placed) -> Array:
-        stream = placed.stream
-        used = (stream.since >= 0) & ((stream.on == stream.on_before) == same)
-        gap = np.clip(stream.since[used] * 1e-3, _GAPS_MS[0], _GAPS_MS[-1])
-        return np.histogram(gap, _GAPS_MS)[0].astype(np.float64)
-
-    return measure
+def _gaps(placed: Placed, same: bool) -> Array:
+    """Return times between events of a pixel [ms], of the same or of the other polarity."""
+    stream = placed.stream
+    used = (stream.since >= 0) & ((stream.on == stream.on_before) == same)
+    return np.asarray(np.clip(stream.since[used] * 1e-3, _GAPS_MS[0], _GAPS_MS[-1]))
 
 
-def _stamps(same: bool) -> Measure:
-    """Count times between events of the whole sensor, of the same row or of another."""
+def _stamps(placed: Placed, same: bool) -> Array:
+    """Return times between events of the whole sensor [us], of the same row or of another."""
+    stream = placed.stream
+    used = (np.diff(stream.pixel // stream.width) == 0) == same
+    return np.asarray(np.clip(np.diff(stream.t)[used], _STAMPS_US[0], _STAMPS_US[-1]))
 
-    def measure(placed: Placed) -> Array:
-        stream = placed.stream
-        used = (np.diff(stream.pixel // stream.width) == 0) == same
-        gap = np.clip(np.diff(stream.t)[used], _STAMPS_US[0], _STAMPS_US[-1])
-        return np.histogram(gap, _STAMPS_US)[0].astype(np.float64)
 
-    return measure
+def _phases(placed: Placed, scene: Scene, moving: bool) -> Array:
+    """Return the places of events between two frames [%], in motion or at rest."""
+    used = (placed.speed != STILL) == moving
+    return 100.0 * scene.phase_of(placed.stream.t[used], placed.interval[used])
+
+
+def _since_leap(placed: Placed, leaps: Leaps, on: int) -> Array:
+    """Return the times from the light's last leap to events of a polarity [ms]."""
+    since = leaps.since(placed.stream)
+    used = (since >= 0) & (placed.stream.on == on)
+    return np.asarray(np.maximum(since[used] * 1e-3, _SINCE_LEAP_MS[0]))
 
 
 def _rates(scene: Scene, kind: NDArray[Any], classes: int, on: int | None = None) -> Measure:
@@ -344,39 +366,5 @@ def _lags(scene: Scene) -> Measure:
             slope = scene.slope[scene.interval_of(stream.t, lag * 1e3), stream.pixel]
             values.append(float(np.mean(np.clip(slope, -_STEEPEST, _STEEPEST) * sign)))
         return np.array(values)
-
-    return measure
-
-
-def _phases(scene: Scene, moving: bool) -> Measure:
-    """Count events by their place between two frames [%], in motion or at rest."""
-
-    def measure(placed: Placed) -> Array:
-        used = (placed.speed != STILL) == moving
-        phase = scene.phase_of(placed.stream.t[used], placed.interval[used])
-        return np.histogram(100.0 * phase, _PHASES)[0].astype(np.float64)
-
-    return measure
-
-
-def _since_leap(leaps: Leaps, on: int) -> Measure:
-    """Count events of a polarity by the time since the light leapt."""
-
-    def measure(placed: Placed) -> Array:
-        since = leaps.since(placed.stream)
-        used = (since >= 0) & (placed.stream.on == on)
-        after = np.maximum(since[used] * 1e-3, _SINCE_LEAP_MS[0])
-        return np.histogram(after, _SINCE_LEAP_MS)[0].astype(np.float64)
-
-    return measure
-
-
-def _course(scene: Scene, borders_s: Array) -> Measure:
-    """Return the rate of the whole sensor over time [events a second]."""
-    start, width = scene.times_us[0], borders_s[1] - borders_s[0]
-
-    def measure(placed: Placed) -> Array:
-        number, _ = np.histogram((placed.stream.t - start) * 1e-6, borders_s)
-        return np.asarray(number / width)
 
     return measure

@@ -15,7 +15,6 @@ from adv2e.comparison.distances import SIGMAS_US, smoothed_norms
 from adv2e.config import Config
 from adv2e.diagnosis.configurations import without_coupling
 from adv2e.diagnosis.data import splits
-from adv2e.diagnosis.data.scene import Placed
 from adv2e.diagnosis.data.splits import Stream
 from adv2e.diagnosis.fitting.candidates import Candidate, neutral_value
 from adv2e.diagnosis.hints.readouts import DRIFT
@@ -142,25 +141,17 @@ DRAWS = 12
 _FIRST_DRAW = 20_000
 
 
-@dataclass(frozen=True)
-class Conclusion:
-    """Verdict on a recording, with errors and pictures of the declared model and of `kept`.
-
-    `kept` is the model that is reported: the declared one where no effect is named.
-    """
-
-    verdict: Verdict
-    kept: State
-    errors: list[ErrorRow]
-    pictures: dict[str, Any]
-
-
 def drawn(simulator: Simulator, config: Config, first: int = _FIRST_DRAW) -> list[Stream]:
     """Return simulations of a model to compare with the recording."""
     return simulator.streams(config, range(first, first + DRAWS))
 
 
-def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion:
+def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> tuple[State, dict[str, Any]]:
+    """Return the model that is reported, and what a diagnosis says of it beside the declared one.
+
+    It is the declared one where no effect is named.  Verdict, remark, errors and pictures are by
+    the names of a diagnosis.
+    """
     scene, simulator = prepared.scene, prepared.reference.sampler.simulator
     simulator.begin("judging on data not used so far")
 
@@ -197,11 +188,9 @@ def conclude(prepared: Prepared, search: Search, outcome: Outcome) -> Conclusion
     if verdict in ("consistent", "unexplained") and kept is not declared:
         kept, after = declared, before
         rows = error_rows(of_before, of_before)
-    recorded = Placed.of(prepared.evidence.stream, scene)
-    first, second = (
-        [Placed.of(stream, scene) for stream in streams] for streams in (before, after)
-    )
-    return Conclusion(verdict, kept, rows, pictures_of(scene, recorded, first, second))
+    pictures = pictures_of(scene, prepared.evidence.stream, before, after)
+    told = {"verdict": verdict, "remark": remark_of(verdict, outcome), "errors": rows}
+    return kept, {**told, **pictures}
 
 
 # ---- The size of each effect that would have been seen.

@@ -173,7 +173,7 @@ def ranked(reference: Reference, states: Sequence[State], parameters: Sequence[i
     if not np.any(ranking.scores[ranking.best] - ranking.scores[near] > CLOSE):
         return ranking
     configs = [states[k].config for k in near]
-    often = [reference.ensembles(one, reference.sampler.sample(one, _OFTEN)) for one in configs]
+    often = [reference.ensembles(one, _OFTEN) for one in configs]
     again = _ranked(reference, often, [parameters[k] for k in near])
     scores = ranking.scores.copy()
     scores[near] = again.scores

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -158,14 +158,14 @@ class Reference:
         return Fitter(sampler, self.scales[view], goal, view, sd)
 
     def ensembles(
-        self, config: Config, sample: Array, beside: Config | None = None
+        self, config: Config, seeds: Sequence[int], beside: Config | None = None
     ) -> tuple[Ensemble, ...]:
-        """Return, for each view, a configuration's simulations, (seeds, views, statistics).
+        """Return, for each view, simulations of a configuration.
 
         `beside`: another that they are compared with.  What is as uncertain in that one, as its
         frames are shifted, is so in these, too: or else it would gain by its doubt alone.
         """
-        shifted = self._resampling.error(config)
+        sample, shifted = self.sampler.sample(config, seeds), self._resampling.error(config)
         doubted = None
         if shifted is None and beside is not None:
             doubted = self._resampling.error(beside)
@@ -182,26 +182,21 @@ class Reference:
 
     def further(self, config: Config) -> tuple[Array, ...]:
         """Return, for each view, further simulations in compressed deviations."""
-        return tuple(
-            one.sample for one in self.ensembles(config, self.sampler.sample(config, FURTHER))
-        )
+        return tuple(one.sample for one in self.ensembles(config, FURTHER))
 
     def tried(self, config: Config, beside: Config | None = None) -> tuple[Ensemble, ...]:
         """Return simulations of a configuration, often enough to judge it; see `ensembles`."""
-        return self.ensembles(config, self.sampler.sample(config, range(1, SOME + 1)), beside)
+        return self.ensembles(config, range(1, SOME + 1), beside)
 
     def compared(self, state: State, beside: State) -> State:
         """Return a model as it is compared with another, as often; see :meth:`ensembles`."""
-        count = len(beside.ensembles[BOTH].sample)
-        sample = self.sampler.sample(state.config, range(1, count + 1))
-        return dataclasses.replace(
-            state, ensembles=self.ensembles(state.config, sample, beside.config)
-        )
+        seeds = range(1, len(beside.ensembles[BOTH].sample) + 1)
+        ensembles = self.ensembles(state.config, seeds, beside.config)
+        return dataclasses.replace(state, ensembles=ensembles)
 
     def state(self, config: Config, fits: tuple[Fitted, ...] = ()) -> State:
         """Return a model, simulated often enough to build on it."""
-        sample = self.sampler.sample(config, range(1, MANY + 1))
-        return State(config, fits, self.ensembles(config, sample))
+        return State(config, fits, self.ensembles(config, range(1, MANY + 1)))
 
     def settled(self, fits: tuple[Fitted, ...], sd: Array) -> State:
         """Return the model of effects fitted together to the data for training and validation.

@@ -91,10 +91,8 @@ class Search:
         candidates: list[Candidate],
         changed: Callable[[Search, State], None] = lambda search, state: None,
     ) -> None:
-        unknown = {parameter.key for parameter in reference.nuisances.parameters}
-        self.candidates = [
-            one for one in candidates if not unknown & {each.key for each in one.parameters}
-        ]
+        unknown = reference.nuisances.keys
+        self.candidates = [one for one in candidates if not unknown & one.keys]
         self.reference, self._changed = reference, changed
         self.declared = reference.state(reference.declared)
         self._changed(self, self.declared)

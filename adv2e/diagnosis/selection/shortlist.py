@@ -88,11 +88,12 @@ def shortlisted(reference: Reference, state: State, candidates: Sequence[Candida
 def _simulated(reference: Reference, fits: Sequence[Fitted], seeds: int) -> list[Trial]:
     """Return fits simulated so many times, the best first."""
     configs = [fit.config for fit in fits]
-    sample = reference.sampler.samples(configs, range(1, seeds + 1))
-    trials = [
-        Trial(fit, ensembles, scored(reference, ensembles, len(fit.candidate.parameters)))
-        for fit, ensembles in zip(fits, map(reference.ensembles, configs, sample), strict=True)
-    ]
+    reference.sampler.samples(configs, range(1, seeds + 1))  # all at once, then held
+    trials = []
+    for fit, config in zip(fits, configs, strict=True):
+        ensembles = reference.ensembles(config, range(1, seeds + 1))
+        score = scored(reference, ensembles, len(fit.candidate.parameters))
+        trials.append(Trial(fit, ensembles, score))
     return sorted(trials, key=lambda trial: -trial.score)
 
 

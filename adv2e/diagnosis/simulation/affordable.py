@@ -19,7 +19,6 @@ from adv2e.kernel.inputs import EXACT
 from adv2e.light.interpolation.linear import instant_ns
 from adv2e.pixel.state import driver_of, make_circuit
 from adv2e.pixel.steps import Coarseness, steps_of
-from adv2e.reports.result import Masked
 
 FINE = Coarseness(5.0)
 """Steps of time of simulations: some us off, which no statistic shows."""
@@ -176,5 +175,5 @@ def _partial(part: Evidence, whole: Evidence, what: str, note: str) -> Evidence:
     note += (
         ", as all of them would take too long to simulate often enough: what is said holds there"
     )
-    masked = Masked(what, 1.0 - len(part.stream) / len(whole.stream))
-    return replace(part, masked=[*whole.masked, masked], notes=[*whole.notes, note])
+    told = replace(part, masked=whole.masked, notes=[*whole.notes, note])
+    return told.without(what, of=len(whole.stream))

@@ -38,25 +38,15 @@ _ROUGH = Coarseness(5.0, 2.5)
 """Twice as fast with what takes longest, and off by what the first steps of a fit do not show."""
 
 
-class Simulator:
-    """Turns configurations into streams, in threads: a simulation in each.
+class Progress:
+    """Counts simulations, in many threads, and tells of them and of stages.
 
     `progress` takes the stage, in a few words, and the number of simulations done in all stages: at
     each stage that begins, and after each simulation.
     """
 
-    def __init__(
-        self,
-        evidence: Evidence,
-        threads: int,
-        progress: Callable[[str, int], None] = lambda stage, simulations: None,
-    ) -> None:
-        self._evidence, self._threads, self._progress = evidence, threads, progress
-        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="adv2e-simulate")
-        self._frames, self._counting = FrameCache(), threading.Lock()
-        self._light: Callable[[Config], Instants] = lambda config: self._frames.of(
-            config, lambda: evidence.instants(config)
-        )
+    def __init__(self, progress: Callable[[str, int], None]) -> None:
+        self._progress, self._counting = progress, threading.Lock()
         self.done, self._stage = 0, ""
 
     def begin(self, stage: str) -> None:
@@ -64,6 +54,31 @@ class Simulator:
         with self._counting:
             self._stage = stage
             self._progress(stage, self.done)
+
+    def count(self, trying: str = "") -> None:
+        """Count a simulation; `trying` names the effect that it was made for, to be told."""
+        with self._counting:
+            self.done += 1
+            also = f": {trying}" if trying not in self._stage else ""
+            self._progress(self._stage + also, self.done)
+
+
+class Simulator(Progress):
+    """Turns configurations into streams, in threads: a simulation in each."""
+
+    def __init__(
+        self,
+        evidence: Evidence,
+        threads: int,
+        progress: Callable[[str, int], None] = lambda stage, simulations: None,
+    ) -> None:
+        super().__init__(progress)
+        self._evidence, self._threads = evidence, threads
+        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="adv2e-simulate")
+        self._frames = FrameCache()
+        self._light: Callable[[Config], Instants] = lambda config: self._frames.of(
+            config, lambda: evidence.instants(config)
+        )
 
     def of(self, evidence: Evidence) -> Simulator:
         """Return a simulator of another recording, which reports no progress."""
@@ -100,10 +115,7 @@ class Simulator:
             threads=1,
             coarseness=_ROUGH if rough else FINE,
         )
-        with self._counting:
-            self.done += 1
-            also = f": {trying}" if trying not in self._stage else ""
-            self._progress(self._stage + also, self.done)
+        self.count(trying)
         first, last = evidence.times_s[0] * 1e6, evidence.times_s[-1] * 1e6
         return Stream.of(events, evidence.width, evidence.height).between(first, last)
 

@@ -25,10 +25,6 @@ _QUIET = 1e-3
 """Variance that is added before a logarithm is taken."""
 
 
-def _surplus(logarithm: float) -> float:
-    return exponential(logarithm) - 1.0
-
-
 def _spread(logarithm: float) -> float:
     return math.sqrt(max(exponential(logarithm) - _QUIET, 0.0))
 
@@ -36,6 +32,11 @@ def _spread(logarithm: float) -> float:
 def _covariance(name: str, of: str) -> Entry:
     meaning = f"covariance over the pixels: {of}, in squares of the standard deviation of chance"
     return Entry(name, meaning, COVARIANCE)
+
+
+def _loudest(name: str, which: str) -> Entry:
+    meaning = f"surplus of events in {which}, in standard deviations (sd) of chance"
+    return Entry(name, meaning, SURPLUS, lambda logarithm: exponential(logarithm) - 1.0)
 
 
 def _gradient(name: str, to: str) -> Entry:
@@ -67,18 +68,8 @@ _ENTRIES = [
         "ON becomes OFF",
         "surplus of ON events in one half of the time with that of OFF events in the other half",
     ),
-    *(
-        Entry(
-            name,
-            f"surplus of events in {which}, in standard deviations (sd) of chance",
-            SURPLUS,
-            _surplus,
-        )
-        for name, which in (
-            ("loudest pixels", "the busiest hundredth of the pixels"),
-            ("loudest pixel", "the busiest pixel"),
-        )
-    ),
+    _loudest("loudest pixels", "the busiest hundredth of the pixels"),
+    _loudest("loudest pixel", "the busiest pixel"),
     _SILENT,
     *(
         Entry(

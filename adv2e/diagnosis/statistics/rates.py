@@ -256,50 +256,6 @@ def sum_slopes(
 
 
 @kernel
-def sum_slopes_beside(
-    t: Any, pixel: Any, on: Any, part: Any, width: int, times: Any, lags: Any, slope: Any, sums: Any
-) -> None:
-    """Add up the change of light right of each event less that left of it, and below less above.
-
-    `sums`: (2 lags, parts), right and below in turn.  No event is at the border.
-    """
-    for j in range(lags.shape[0]):
-        i, f, right, below = 0, 0, sums[2 * j], sums[2 * j + 1]
-        while i < t.shape[0]:
-            f = _frame_of(t[i], lags[j], times, f)
-            end, now = _end_of(f, lags[j], times), slope[f]
-            while i < t.shape[0] and t[i] < end:
-                n, p, sign = pixel[i], part[i], 1.0 if on[i] else -1.0
-                right[p] += sign * (now[n + 1] - now[n - 1])
-                below[p] += sign * (now[n + width] - now[n - width])
-                i += 1
-
-
-@kernel
-def count_gaps(
-    t: Any, pixel: Any, part: Any, width: int, borders: Any, near: Any, gaps: Any, rows: Any
-) -> None:
-    """Count the times between neighbouring events of the stream.
-
-    `borders` of the `gaps` counted, (parts, gaps), and the largest gap that is `near`, (kinds,)
-    [us]; `rows`, (parts, kinds, 2): how many are close, and how many of those share a row.
-    """
-    for i in range(1, t.shape[0]):
-        gap = t[i] - t[i - 1]
-        k = np.int64(0)
-        while k < borders.shape[0] and gap >= borders[k]:
-            k += 1
-        gaps[part[i], k] += 1.0
-        if gap < near[near.shape[0] - 1]:
-            same = pixel[i] // width == pixel[i - 1] // width
-            for m in range(near.shape[0]):
-                if gap < near[m]:
-                    rows[part[i], m, 0] += 1.0
-                    if same:
-                        rows[part[i], m, 1] += 1.0
-
-
-@kernel
 def count_neighbours(
     t: Any, pixel: Any, on: Any, part: Any, width: int, borders: Any, last: Any, number: Any
 ) -> None:

@@ -21,12 +21,10 @@ from adv2e.diagnosis.statistics.groups import (
     stabilised,
 )
 from adv2e.diagnosis.statistics.rates import (
-    count_gaps,
     count_neighbours,
     find_places,
     spans_text,
     sum_slopes,
-    sum_slopes_beside,
 )
 from adv2e.reports.quantities import NO_UNIT
 
@@ -143,19 +141,23 @@ def shift(slopes: Slopes) -> Group:
     ]
 
     lags = 1e3 * np.array(_BESIDE_MS)
-    y, x = np.mgrid[: slopes.scene.height, : slopes.scene.width]
-    inside = ((x > 0) & (y > 0) & (x < x[0, -1]) & (y < y[-1, 0])).ravel()
+    scene = slopes.scene
+    light = slopes.bounded.reshape(-1, scene.height, scene.width)
+    across = np.zeros((2, *light.shape), np.float32)
+    across[0, :, :, 1:-1] = light[:, :, 2:] - light[:, :, :-2]
+    across[1, :, 1:-1] = light[:, 2:] - light[:, :-2]
+    inside = np.zeros((scene.height, scene.width), np.bool_)
+    inside[1:-1, 1:-1] = True
 
     def count(placed: Placed) -> Array:
-        stream, scene = placed.stream, slopes.scene
-        used = inside.take(stream.pixel)
-        part, sums = placed.part[used], np.zeros((2 * len(lags), splits.COUNT))
-        sum_slopes_beside(
-            stream.t[used], stream.pixel[used], stream.on[used], part,
-            scene.width, scene.times_us, lags, slopes.bounded, sums,
-        )  # fmt: skip
+        used = inside.take(placed.stream.pixel)
+        stream, part = placed.stream.chosen(used), placed.part[used]
+        sums = np.zeros((2, len(lags), splits.COUNT))
+        for way, own in zip(across, sums, strict=True):
+            change = way.reshape(scene.intervals, -1)
+            sum_slopes(stream.t, stream.pixel, stream.on, part, scene.times_us, lags, change, own)
         number = np.bincount(part, minlength=splits.COUNT)
-        return np.concatenate([number[:, None], sums.T], axis=1)
+        return np.concatenate([number[:, None], sums.T.reshape(splits.COUNT, -1)], axis=1)
 
     def values(raw: Array) -> Array:
         return share(raw[1:], raw[0])
@@ -319,19 +321,19 @@ def gaps() -> Group:
         for n in _NEAR_US
     ]
 
+    bin_of = np.searchsorted(_GAPS_US, np.arange(_GAPS_US[-1] + 1), "right")
+    last_near = np.searchsorted(_GAPS_US, _NEAR_US)  # each is a border of those gaps
+
     def count(placed: Placed) -> Array:
         stream = placed.stream
-        number = np.zeros((splits.COUNT, len(_GAPS_US) + 1))
-        rows = np.zeros((splits.COUNT, len(_NEAR_US), 2))
-        count_gaps(
-            stream.t, stream.pixel, placed.part, stream.width,
-            np.array(_GAPS_US), np.array(_NEAR_US), number, rows,
-        )  # fmt: skip
-        return np.concatenate([number, rows.reshape(splits.COUNT, -1)], axis=1)
+        gap = np.minimum(np.diff(stream.t), _GAPS_US[-1])
+        same = np.diff(stream.pixel // stream.width) == 0
+        return counts(placed.part[1:], 2 * bin_of[gap] + same, 2 * len(_GAPS_US) + 2)
 
     def values(raw: Array) -> Array:
-        number, near = raw[: len(_GAPS_US) + 1], raw[len(_GAPS_US) + 1 :]
-        return np.concatenate([stabilised(number), (near[1::2] + 0.5) / (near[::2] + 1.0)])
+        number, same = raw[::2] + raw[1::2], raw[1::2]
+        near, of_row = (np.cumsum(one)[last_near] for one in (number, same))
+        return np.concatenate([stabilised(number), (of_row + 0.5) / (near + 1.0)])
 
     return Group("time between events of the sensor", 0.002, entries, count, values, kind="time")
 

@@ -42,7 +42,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -183,19 +183,18 @@ def _usual_squares(differences: Array, groups: Sequence[str]) -> Array:
 class Pilot:
     """Simulations of the declared model, by seed, that tell what to expect, also of other frames.
 
-    `simulator` makes one of a recording.
+    `simulator` is of the recording.
     """
 
     evidence: Evidence
     declared: Config
     statistics: SummaryStatistics
     streams: dict[int, Stream]
-    simulator: Callable[[Evidence], Simulator]
+    simulator: Simulator
 
     @cached_property
     def sample(self) -> Array:
-        with closing(self.simulator(self.evidence)) as made:
-            return np.array(made.map(self.statistics.measure, self.streams.values()))
+        return np.array(self.simulator.map(self.statistics.measure, self.streams.values()))
 
     @cached_property
     def undisturbed(self) -> Pilot:
@@ -203,19 +202,15 @@ class Pilot:
         bare = without_coupling(self.declared)
         if bare == self.declared:
             return self
-        streams = self._simulated(self.evidence, bare)
+        streams = self.simulator.aside().streams(bare, self.streams)
         return replace(self, declared=bare, streams=dict(zip(self.streams, streams, strict=True)))
 
     def change(self, evidence: Evidence) -> Change:
         """Return the change of the statistics with the frames of `evidence`, by the same seeds."""
         measure, declared = self.statistics.measure, self.declared
-        with closing(self.simulator(evidence)) as made:
+        with closing(self.simulator.of(evidence)) as made:
             less = made.map(lambda seed: measure(made.stream(declared, seed)), self.streams)
         return Change.of(self.sample, np.array(less), self.statistics.titles, self.statistics.least)
-
-    def _simulated(self, evidence: Evidence, config: Config) -> list[Stream]:
-        with closing(self.simulator(evidence)) as made:
-            return made.streams(config, self.streams)
 
 
 def between_frames(pilot: Pilot) -> FrameError | None:

@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 from adv2e.config.model import Pixel, Sampling
 from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 from adv2e.diagnosis.tables.problem import (
+    CUTOFF,
     DARK_CURRENT,
+    DARK_CUTOFF,
+    FOLLOWER,
     Array,
     Declared,
     Problem,
@@ -30,9 +33,6 @@ from adv2e.errors import DataError
 from adv2e.kernel import per_pixel
 from adv2e.pixel.array import PixelArray
 
-CUTOFF = "pixel.low_pass.cutoff_hz"
-DARK_CUTOFF = "pixel.low_pass.dark_cutoff_hz"
-FOLLOWER = "pixel.source_follower.cutoff_hz"
 SLEW = "pixel.slew_limit.per_s"
 OFFSET = "frames.clock_offset_us"
 THRESHOLD = {1: "pixel.thresholds.on", 0: "pixel.thresholds.off"}

@@ -45,11 +45,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from adv2e.diagnosis.tables.threshold_noise import (
-    HIGHEST,
-    event_rates,
-    lagrange_weights,
-)
+from adv2e.diagnosis.tables.threshold_noise import HIGHEST, cubic, event_rates
 from adv2e.effects.hooks import LONGEST_US
 from adv2e.effects.pixel.shot_noise import FALL_AT_WHITE
 from adv2e.effects.pixel.thresholds import FLOOR
@@ -114,28 +110,20 @@ class Rates:
     hot_off: float
     """Share of the hot pixels whose events are OFF, else ON."""
 
-    @property
-    def leak(self) -> Array:
-        return _typical(self.leak_of, self.weights)
+    def median(self, on: bool) -> Array:
+        """Return the rate of ON or OFF events, median over the pixels that are not hot."""
+        leak, noise = self._causes(on)
+        return _typical(leak + noise, self.weights)
 
-    @property
-    def on(self) -> Array:
-        return _typical(self.leak_of + self.on_of, self.weights)
+    def mean(self, on: bool) -> Array:
+        """Return the rate of ON or OFF events, mean over all pixels."""
+        leak, noise = self._causes(on)
+        base: Array = (leak + noise) @ self.weights
+        return base + self._hot(on) * float(self.hot_hz @ _density(_HOT))
 
-    @property
-    def off(self) -> Array:
-        return _typical(self.off_of, self.weights)
-
-    @property
-    def on_mean(self) -> Array:
-        """ON events, mean over all pixels."""
-        base: Array = (self.leak_of + self.on_of) @ self.weights
-        return base + self._hot(True) * float(self.hot_hz @ _density(_HOT))
-
-    @property
-    def off_mean(self) -> Array:
-        base: Array = self.off_of @ self.weights
-        return base + self._hot(False) * float(self.hot_hz @ _density(_HOT))
+    def _causes(self, on: bool) -> tuple[Array, Array]:
+        """Return rates by leak and by noise."""
+        return (self.leak_of, self.on_of) if on else (0.0 * self.leak_of, self.off_of)
 
     def _hot(self, on: bool) -> float:
         """Return the share of all pixels that is hot and has such events."""
@@ -148,7 +136,7 @@ class Rates:
     def share_having(self, number: int, seconds: Array, on: bool) -> Array:
         """Return the share of all pixels that have so many events or more in (n,) seconds."""
         time = seconds[:, None]
-        noise, leak = (self.on_of, self.leak_of) if on else (self.off_of, 0.0 * self.leak_of)
+        leak, noise = self._causes(on)
         usual = ((leak + noise) @ self.weights)[:, None]
         noise, leak = noise * time, leak * time
         whole = np.floor(leak)  # leak is regular: one number of events, or one more
@@ -321,8 +309,10 @@ class Law:
     def rates(self, on: Array, off: Array) -> Array:
         """Return the rates [Hz], (2, ...), of pixels with these thresholds [ln]."""
         on, off = on / self._sigma + self._shift, off / self._sigma + self._shift
-        first, weights = _cubic((np.minimum(on, off) - _LEAST) / _GRID, _COUNT)
-        second, apart_weights = _cubic(_RULER.place(off - on) + _APART.size // 2, _APART.size)
+        lower = np.clip((np.minimum(on, off) - _LEAST) / _GRID, 0.0, _COUNT - 1.0)
+        apart = np.clip(_RULER.place(off - on) + _APART.size // 2, 0.0, _APART.size - 1.0)
+        first, weights = cubic(lower, _COUNT)
+        second, apart_weights = cubic(apart, _APART.size)
         logs = np.zeros((2, *np.shape(on)))
         for i, p in enumerate(weights):
             for j, q in enumerate(apart_weights):
@@ -378,13 +368,6 @@ def _kept(value: float, kept: tuple[float, int, int]) -> list[tuple[float, float
     share = place - below
     parts = [(base**below, 1.0 - share), (base ** (below + 1), share)]
     return parts if share > 0.0 else parts[:1]
-
-
-def _cubic(place: Array, count: int) -> tuple[NDArray[np.int64], list[Array]]:
-    """Return the first of four kept values about each place, and their weights (Lagrange)."""
-    place = np.clip(place, 0.0, count - 1.0)
-    first = np.clip(place.astype(np.int64) - 1, 0, count - 4)
-    return first, lagrange_weights(place - first)
 
 
 def _laws(sources: NoisySources, light: Array, leak: Array) -> list[Law]:

@@ -13,7 +13,10 @@ from numpy.typing import NDArray
 from adv2e.diagnosis.fitting.candidates import NOTHING, Candidate, FitParameter
 from adv2e.diagnosis.tables.noise import NoisySources, Rates, at_least, noise_rates
 from adv2e.diagnosis.tables.problem import (
+    CUTOFF,
     DARK_CURRENT,
+    DARK_CUTOFF,
+    FOLLOWER,
     Array,
     Declared,
     Problem,
@@ -31,9 +34,6 @@ HOT_FRACTION = "pixel.hot_pixels.fraction"
 HOT_RATE = "pixel.hot_pixels.rate_hz"
 HOT_SPREAD = "pixel.hot_pixels.spread"
 HOT_OFF = "pixel.hot_pixels.off_fraction"
-CUTOFF = "pixel.low_pass.cutoff_hz"
-DARK_CUTOFF = "pixel.low_pass.dark_cutoff_hz"
-FOLLOWER = "pixel.source_follower.cutoff_hz"
 OFF = "pixel.thresholds.off"
 MISMATCH = "pixel.thresholds.mismatch"
 
@@ -171,19 +171,13 @@ class NoiseProblem(Problem):
         first = np.unique(self.level, return_index=True)[1]
         rates = self.rates(values, self.light[first])
         seconds = np.where(np.isnan(self._duration), 1.0, self._duration)
-        by_kind = {
-            "on_rate_hz": rates.on_mean,
-            "off_rate_hz": rates.off_mean,
-            "on_median_hz": rates.on,
-            "off_median_hz": rates.off,
-        }
         rate = np.empty(self.level.size)
         for k, rows in self._rows.items():
-            number, at = self._numbers[rows[0]], self.level[rows]
+            number, at, on = self._numbers[rows[0]], self.level[rows], k.startswith("on")
             if number == 0:
-                rate[rows] = by_kind[k][at]
+                rate[rows] = (rates.median(on) if "_median_" in k else rates.mean(on))[at]
             else:
-                share = rates.at(at).share_having(number, seconds[rows], k.startswith("on"))
+                share = rates.at(at).share_having(number, seconds[rows], on)
                 share, _ = _drawn_share(share, self._pixels[rows])
                 rate[rows] = _as_poisson(number, share) / seconds[rows]
         logs: Array = np.log(rate + self.floor)

@@ -16,7 +16,8 @@ from adv2e.diagnosis.fitting.candidates import Candidate, FitParameter
 
 Array = NDArray[np.float64]
 
-DARK_CURRENT = "pixel.dark_current.dn"
+CUTOFF, DARK_CUTOFF = "pixel.low_pass.cutoff_hz", "pixel.low_pass.dark_cutoff_hz"
+DARK_CURRENT, FOLLOWER = "pixel.dark_current.dn", "pixel.source_follower.cutoff_hz"
 
 
 @dataclass(frozen=True)

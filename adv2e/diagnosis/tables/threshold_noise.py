@@ -163,7 +163,7 @@ def event_rates(
     z = np.clip(z, -farthest, farthest)
     y = y / np.sqrt(1.0 + ratio)
     p_on, p_off, time = (part @ _SLOW_WEIGHTS for part in _exit_from(z, y, on, off, ratio))
-    here = _cubic_weights(z, places)
+    here = cubic((z - places[0]) / (places[1] - places[0]), _PLACES)
     chain = np.concatenate([_spread(here, p_on), _spread(here, p_off)], axis=1)
     if leak > 0.0:
         rest = np.broadcast_to(_REST, (_PLACES, _REST.size))
@@ -244,21 +244,20 @@ def _landings(levels: Array, ways: Array, dead_time: float, ratio: float) -> tup
     return z, y[..., None] + rest[:, None, None] * _SLOW
 
 
-def _cubic_weights(z: Array, places: Array) -> tuple[NDArray[np.int64], Array]:
-    """Return the first of four places about each z, and their weights, (4, ...) (Lagrange)."""
-    at = (z - places[0]) / (places[1] - places[0])
-    first = np.clip(at.astype(np.int64) - 1, 0, _PLACES - 4)
-    return first, np.stack(lagrange_weights(at - first))
+def cubic(place: Array, count: int) -> tuple[NDArray[np.int64], Array]:
+    """Return the first of four values of `count` about each place, and weights, (4, ...).
 
-
-def lagrange_weights(t: Array) -> list[Array]:
-    """Return the weights of values at 0, 1, 2 and 3 in a cubic at `t`."""
-    return [
+    Those of a cubic through them (Lagrange); places are counted in values, from 0.
+    """
+    first = np.clip(place.astype(np.int64) - 1, 0, count - 4)
+    t = place - first
+    weights = [
         -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0,
         t * (t - 2.0) * (t - 3.0) / 2.0,
         -t * (t - 1.0) * (t - 3.0) / 2.0,
         t * (t - 1.0) * (t - 2.0) / 6.0,
     ]
+    return first, np.stack(weights)
 
 
 def _interpolated(here: tuple[NDArray[np.int64], Array], values: Array) -> Array:

@@ -146,7 +146,7 @@ def test_a_dead_time_is_found_behind_a_view_that_nobody_knows(adv2e, tmp_path, r
 def test_events_tell_where_a_camera_looked_and_whether_the_picture_was_inverted(recorded, inverted):
     pairs = recorded({}, 4, inverted=inverted)
     recordings = read_recordings(read_pairs(pairs))
-    view = first_view(recordings.films, recordings.stream())
+    view = first_view(recordings.films, recordings.stream)
     assert view.inverted is inverted
     times_s = recordings.films.times_ns * 1e-9
     moving = (times_s > 0.08) & (times_s < 0.18)
@@ -309,7 +309,7 @@ def test_a_video_is_seen_where_it_was_shifted_to(adv2e, tmp_path):
 
 def test_a_number_that_the_recordings_do_not_tell_may_be_anything(recorded):
     recordings = read_recordings(read_pairs(recorded({}, 4, inverted=False)))
-    fitter = FilmFitter(recordings.films, recordings.stream(), 1)
+    fitter = FilmFitter(recordings.films, recordings.stream, 1)
     # no event is within so short a time of another, so none is lost
     key = FitParameter("pixel.refractory.period_us", 1e-3, 1e6)
     keys = Candidate("refractory", (key,), ((1e-3,),))

@@ -1,7 +1,5 @@
 """Which of several models explains most, where their likelihoods hang on chance."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -28,7 +26,6 @@ class Means:
         unit = np.ones(STATISTICS)
         self.scale = Scale(0.0 * unit, unit, np.eye(STATISTICS))
         self.observed = np.full((VIEWS, STATISTICS), amiss)
-        self.sampler = SimpleNamespace(sample=self._sample)
         self.simulated_again = []
 
     def _sample(self, mean, seeds):
@@ -36,13 +33,13 @@ class Means:
         draws = [np.random.default_rng([seed, hash(mean) % 2**32]) for seed in seeds]
         return mean + np.array([draw.normal(size=STATISTICS) for draw in draws])
 
-    def ensembles(self, mean, sample):
-        return (Ensemble.of(self.scale, sample),) * VIEWS
+    def ensembles(self, mean, seeds):
+        return (Ensemble.of(self.scale, self._sample(mean, seeds)),) * VIEWS
 
     def state(self, mean):
-        sample = self._sample(mean, range(1, MANY + 1))
+        ensembles = self.ensembles(mean, range(1, MANY + 1))
         self.simulated_again.clear()
-        return State(mean, (), self.ensembles(mean, sample))
+        return State(mean, (), ensembles)
 
 
 def ranked_means(means, amiss, parameters=None):

@@ -49,9 +49,7 @@ def test_simulations_without_the_bias_are_nearer_to_a_camera(tmp_path):
     simulator = Simulator(evidence, 2)
     streams = {seed: simulator.stream(declared, seed) for seed in range(24)}
     statistics = SummaryStatistics(scene, list(streams.values()))
-    error = between_frames(
-        Pilot(evidence, declared, statistics, streams, lambda fewer: Simulator(fewer, 2))
-    )
+    error = between_frames(Pilot(evidence, declared, statistics, streams, simulator))
     simulator.close()
     sample = np.array([statistics.measure(stream) for stream in streams.values()])[:, BOTH]
     apart = Apart.of(recorded.measured(statistics), sample, error, statistics.least)
@@ -64,11 +62,8 @@ def test_simulations_without_the_bias_are_nearer_to_a_camera(tmp_path):
 
 def test_too_few_frames_tell_nothing():
     evidence = evidence_of(wandering_light(frames=7), 0.01 * np.arange(7))
-
-    def none(fewer):
-        raise AssertionError("nothing to simulate")
-
-    assert between_frames(Pilot(evidence, DECLARED, None, {}, none)) is None
+    nothing_to_simulate = None
+    assert between_frames(Pilot(evidence, DECLARED, None, {}, nothing_to_simulate)) is None
 
 
 @pytest.mark.thorough
@@ -84,7 +79,7 @@ def test_frames_that_are_left_out_were_read_out_all_the_same():
     streams = simulator.streams(declared, PILOT_SEEDS)
     assert np.mean([len(stream) for stream in streams]) > 1000
     by_seed = dict(zip(PILOT_SEEDS, streams, strict=True))
-    pilot = Pilot(evidence, declared, SummaryStatistics(scene, streams), by_seed, simulator.of)
+    pilot = Pilot(evidence, declared, SummaryStatistics(scene, streams), by_seed, simulator)
     error = between_frames(pilot)
     simulator.close()
     assert not np.any(error.bias)

@@ -219,7 +219,10 @@ def test_gaps(stream):
         for n, reach in enumerate((3, 12, 40, 160)):
             if gap < reach:
                 near[part, n] += [1, pixel // WIDTH == pixel0 // WIDTH]
-    same(timing.gaps().count(where), np.hstack([gaps, near.reshape(PARTS, -1)]))
+    group = timing.gaps()
+    shares = (near[..., 1] + 0.5) / (near[..., 0] + 1.0)
+    expected = np.hstack([2.0 * np.sqrt(gaps + 0.375), shares])
+    same(np.array([group.values(part) for part in group.count(where)]), expected)
 
 
 @several

@@ -85,7 +85,7 @@ def test_leak_becomes_rare_beside_noise():
     waits = rng.exponential(1.0 / noise_hz, 200_000)
     leaks = np.floor(waits * leak_hz).sum()  # every 1/leak_hz until noise takes the reference anew
     rates = noise_rates(NoisySources(leak_hz=leak_hz, shot_hz=noise_hz), np.zeros(1))
-    assert rates.leak[0] == pytest.approx(leaks / waits.sum(), rel=0.02)
+    assert rates.leak_of[0, 0] == pytest.approx(leaks / waits.sum(), rel=0.02)
 
 
 def test_nothing_missing_is_consistent():
