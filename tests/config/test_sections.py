@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from adv2e import compiled
-from adv2e.config import Config, load_config
+from adv2e.config import Config
 from adv2e.config.model import Pixel, Sampling
 from adv2e.conversion.simulation import simulate
 from adv2e.effects.pixel.leak import Leak
@@ -54,20 +54,22 @@ def test_the_range_is_checked_all_the_same():
 @pytest.mark.parametrize("form", ["exact", "paper"])
 def test_whole_numbers_compile_nothing_anew(form):
     """To compile a solver takes a minute."""
-    whole = Config(
-        pixel=Pixel(
-            thresholds=Thresholds(on=1, off=1, mismatch=0),
-            log_response=LogResponse(linear_below=2, floor=1),
-            refractory=Refractory(period_us=100),
-            leak=Leak(rate_hz=1, jitter=0),
-            low_pass=LowPass(cutoff_hz=100, dark_cutoff_hz=1, update=form),
-        ),
-        sampling=Sampling(L=1, K=2),
-    )
+
+    def made(number):
+        return Config(
+            pixel=Pixel(
+                thresholds=Thresholds(on=number(1), off=number(1), mismatch=number(0)),
+                log_response=LogResponse(linear_below=number(2), floor=number(1)),
+                refractory=Refractory(period_us=number(100)),
+                leak=Leak(rate_hz=number(1), jitter=number(0)),
+                low_pass=LowPass(cutoff_hz=number(100), dark_cutoff_hz=number(1), update=form),
+            ),
+            sampling=Sampling(L=1, K=2),
+        )
+
     frames, times = np.full((3, 4, 5), 0.04, np.float32), [0.0, 0.1, 0.2]
-    usual = load_config([], [f"pixel.low_pass.update={form}"])
-    list(simulate(frames, times, usual, threads=1))
+    list(simulate(frames, times, made(float), threads=1))
     seen = []
     with compiled.watched(seen.append):
-        list(simulate(frames, times, whole, threads=1))
+        list(simulate(frames, times, made(int), threads=1))
     assert seen == []
