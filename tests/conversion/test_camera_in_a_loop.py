@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import pickle
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
+from threads import wait_until
 
 import adv2e
 from adv2e import Camera, ConfigError, DataError, UsageError, load_config, simulate, write_events
@@ -404,6 +407,17 @@ def test_a_camera_works_on_in_a_process_that_was_forked():
     finally:
         child.kill()
         child.join()
+
+
+def test_threads_end_with_the_camera():
+    before = {*threading.enumerate()}
+    camera = Camera(SIZE, CAMERA, threads=2)
+    pushed(camera, clip()[:5], TIMES[:5])
+    own = {*threading.enumerate()} - before
+    assert own
+    del camera
+    gc.collect()
+    wait_until(lambda: not any(thread.is_alive() for thread in own))
 
 
 COMPILED = """
