@@ -72,17 +72,17 @@ def _rests(schedule, f, first, count):
 def _open_strip(lo, count, start, circuit, state, strip, noise):
     """Rows of a strip at the start of a call, its light being in LIGHT_1."""
     noise.kept[0] = 0
+    # slices: indices that count from zero need no test of their sign, which vectors bear ill
+    behind, seen = state[per_pixel.NOISE, lo : lo + count], state[per_pixel.SEEN, lo : lo + count]
+    first, second = state[per_pixel.LAG, lo : lo + count], state[per_pixel.SECOND, lo : lo + count]
     for k in range(count):
-        noise.rows[photoreceptor.NOISE + k] = state[per_pixel.NOISE, lo + k]
-        noise.rows[photoreceptor.SEEN + k] = state[per_pixel.SEEN, lo + k]
+        noise.rows[photoreceptor.NOISE + k] = behind[k]
+        noise.rows[photoreceptor.SEEN + k] = seen[k]
     for k in range(count):
         strip[screen.LIGHT_0 + k] = strip[screen.LIGHT_1 + k]
-        strip[screen.LAG_0 + k] = state[per_pixel.LAG, lo + k]
-        strip[cascade_screen.SECOND + k] = state[per_pixel.SECOND, lo + k]
-    for k in range(count):
-        i = lo + k
-        screen.watch(k, i, state[per_pixel.X, i], start, circuit, state, strip)
-        strip[screen.AWAY_0 + k] = strip[screen.AWAY_1 + k]
+        strip[screen.LAG_0 + k] = first[k]
+        strip[cascade_screen.SECOND + k] = second[k]
+    screen.watch_all(lo, count, start, circuit, state, strip)
     # the rest of the last strip must be harmless
     for k in range(count, STRIP):
         strip[screen.LIGHT_0 + k] = 1.0
@@ -99,16 +99,23 @@ def _open_strip(lo, count, start, circuit, state, strip, noise):
 @kernel
 def _close_strip(lo, count, piece, circuit, state, strip, noise):
     """State of a strip at the end of a call, before piece number `piece` of all."""
+    # slices, as above
     if circuit.noise_rms > 0.0:
         photoreceptor.put_back(count, noise)
+        behind = state[per_pixel.NOISE, lo : lo + count]
+        seen = state[per_pixel.SEEN, lo : lo + count]
+        drawn = state[per_pixel.NOISE_DRAW, lo : lo + count]
         for k in range(count):
-            state[per_pixel.NOISE, lo + k] = noise.rows[photoreceptor.NOISE + k]
-            state[per_pixel.SEEN, lo + k] = noise.rows[photoreceptor.SEEN + k]
-            state[per_pixel.NOISE_DRAW, lo + k] = piece
+            behind[k] = noise.rows[photoreceptor.NOISE + k]
+            seen[k] = noise.rows[photoreceptor.SEEN + k]
+            drawn[k] = piece
+    first, second = state[per_pixel.LAG, lo : lo + count], state[per_pixel.SECOND, lo : lo + count]
+    x = state[per_pixel.X, lo : lo + count]
     for k in range(count):
-        state[per_pixel.LAG, lo + k] = strip[screen.LAG_0 + k]
-        state[per_pixel.SECOND, lo + k] = strip[cascade_screen.SECOND + k]
-        state[per_pixel.X, lo + k] = screen.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
+        first[k] = strip[screen.LAG_0 + k]
+        second[k] = strip[cascade_screen.SECOND + k]
+    for k in range(count):
+        x[k] = screen.log_of(np.float64(strip[screen.LIGHT_0 + k]), circuit)
 
 
 @inlined

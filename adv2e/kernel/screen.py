@@ -67,6 +67,9 @@ NEVER = 1e30
 EARLY = 1.0 - 1e-6
 """Factor on due times: single precision must not make them late."""
 
+BLOCK = 64
+"""Pixels that are looked through together: what moves lies together."""
+
 STRIDE = STRIP + 16  # one cache line more: rows must not share cache sets
 (
     LIGHT_0,  # light at the start of the interval [DN], and at its end
@@ -138,6 +141,28 @@ def watch(k, i, x1, start, circuit, state, strip):
         strip[OFF + k] = state[per_pixel.OFF, i] - MARGIN
         due = next_noise(i, circuit, state)[1]
         strip[DUE + k] = min(due - start, NEVER) * EARLY
+
+
+@kernel
+def watch_all(lo, count, start, circuit, state, strip):
+    """Rows of the screen for the pixels of a strip, as :func:`watch` has them for one.
+
+    Their distances are those at the start.
+    """
+    hi = lo + count
+    x, reference = state[per_pixel.X, lo:hi], state[per_pixel.REFERENCE, lo:hi]
+    on_level, off_level = state[per_pixel.ON, lo:hi], state[per_pixel.OFF, lo:hi]
+    hold, shot = state[per_pixel.HOLD, lo:hi], state[per_pixel.SHOT_TIME, lo:hi]
+    hot = state[per_pixel.HOT_TIME, lo:hi]
+    for k in range(count):
+        is_held = hold[k] >= 0.0
+        due = shot[k] if circuit.shot_rate > 0.0 else per_pixel.NEVER
+        due = min(due, hot[k] if circuit.hot_rate > 0.0 else per_pixel.NEVER)
+        due = hold[k] - start if is_held else min(due - start, NEVER)
+        strip[AWAY_0 + k] = x[k] - reference[k]
+        strip[ON + k] = NEVER if is_held else on_level[k] - MARGIN
+        strip[OFF + k] = NEVER if is_held else off_level[k] - MARGIN
+        strip[DUE + k] = due * EARLY
 
 
 @kernel
@@ -230,6 +255,9 @@ def flag(strip, end, dark, per_dn, knee_dn, seen, seen_after, on, off, factor, l
         Change of log intensity above which a pixel is looked at in any case, on the foot and on the
         log branch; the latter as a ratio, (b - a)/(b + a).
     """
+    # slices: indices that count from zero need no test of their sign, which vectors bear ill
+    lag, lag_after = strip[seen : seen + STRIP], strip[seen_after : seen_after + STRIP]
+    on_level, off_level = strip[on : on + STRIP], strip[off : off + STRIP]
     for k in range(STRIP):
         i0, i1 = strip[LIGHT_0 + k], strip[LIGHT_1 + k]
         u0, u1 = strip[LAG_0 + k], strip[LAG_1 + k]
@@ -248,11 +276,11 @@ def flag(strip, end, dark, per_dn, knee_dn, seen, seen_after, on, off, factor, l
         low = min(low, turn) if turns else low
         high = max(high, turn) if turns else high
         # a second pole that is on its way to a first one that runs away from it does not turn
-        q0, q1 = strip[seen + k], strip[seen_after + k]
+        q0, q1 = lag[k], lag_after[k]
         flees = ((u0 + u1 <= _ZERO) & (q0 <= u0)) | ((u0 + u1 >= _ZERO) & (q0 >= u0))
         low = min(d0 + q0, d1 + q1 if flees & (not turns) else low)
         high = max(d0 + q0, d1 + q1 if flees & (not turns) else high)
-        hit = (high + fall >= strip[on + k] * factor) | (-low >= strip[off + k] * factor)
+        hit = (high + fall >= on_level[k] * factor) | (-low >= off_level[k] * factor)
         mixed = (i0 < knee_dn) != (i1 < knee_dn)
         steep = (min(i0, i1) >= knee_dn) & (abs(i1 - i0) > largest_step[1] * (i0 + i1))
         far = steep | (abs(dx) > largest_step[0]) | (i1 > _LARGEST_LIGHT)

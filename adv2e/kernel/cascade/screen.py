@@ -164,9 +164,9 @@ def follow(strip, substeps, places, length, circuit, weights):
             strip, FIRST + j * STRIDE, SECOND + j * STRIDE, _f(span), _f(circuit.dark * h),
             _f(circuit.per_dn * h), weights[j],
         )  # fmt: skip
-    last = FIRST + substeps * STRIDE
+    last = strip[FIRST + substeps * STRIDE : FIRST + substeps * STRIDE + STRIP]
     for k in range(STRIP):
-        strip[screen.LAG_1 + k] = strip[last + k]
+        strip[screen.LAG_1 + k] = last[k]
 
 
 @kernel
@@ -185,11 +185,12 @@ def stay(strip):
 @kernel
 def flag_still(strip, end, on, off, factor):
     """Rows AWAY_1 and HIT of :func:`adv2e.kernel.screen.flag`, where nothing moves or lags."""
+    on_level, off_level = strip[on : on + STRIP], strip[off : off + STRIP]
     for k in range(STRIP):
         away = strip[screen.AWAY_0 + k]
         after = away + strip[screen.FALL + k]
         strip[screen.AWAY_1 + k] = after
-        hit = (after >= strip[on + k] * factor) | (-away >= strip[off + k] * factor)
+        hit = (after >= on_level[k] * factor) | (-away >= off_level[k] * factor)
         reason = screen.BY_SIGNAL if hit else _ZERO
         strip[screen.HIT + k] = screen.WHEN_DUE if strip[screen.DUE + k] < end else reason
 
@@ -210,9 +211,9 @@ def step_on(strip, substeps, still):
             strip[screen.AWAY_0 + k] = strip[screen.AWAY_1 + k]
         return
     screen.step_on(strip)
-    last = SECOND + substeps * STRIDE
+    last = strip[SECOND + substeps * STRIDE : SECOND + substeps * STRIDE + STRIP]
     for k in range(STRIP):
-        strip[SECOND + k] = strip[last + k]
+        strip[SECOND + k] = last[k]
 
 
 @kernel
