@@ -71,7 +71,7 @@ def _rests(schedule, f, first, count):
 @kernel
 def _open_strip(lo, count, start, circuit, state, strip, noise):
     """Rows of a strip at the start of a call, its light being in LIGHT_1."""
-    noise.kept[0] = 0
+    noise.law[0] = 0
     # slices: indices that count from zero need no test of their sign, which vectors bear ill
     behind, seen = state[per_pixel.NOISE, lo : lo + count], state[per_pixel.SEEN, lo : lo + count]
     first, second = state[per_pixel.LAG, lo : lo + count], state[per_pixel.SECOND, lo : lo + count]
@@ -101,7 +101,6 @@ def _close_strip(lo, count, piece, circuit, state, strip, noise):
     """State of a strip at the end of a call, before piece number `piece` of all."""
     # slices, as above
     if circuit.noise_rms > 0.0:
-        photoreceptor.put_back(count, noise)
         behind = state[per_pixel.NOISE, lo : lo + count]
         seen = state[per_pixel.SEEN, lo : lo + count]
         drawn = state[per_pixel.NOISE_DRAW, lo : lo + count]

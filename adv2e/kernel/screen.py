@@ -67,9 +67,6 @@ NEVER = 1e30
 EARLY = 1.0 - 1e-6
 """Factor on due times: single precision must not make them late."""
 
-BLOCK = 64
-"""Pixels that are looked through together: what moves lies together."""
-
 STRIDE = STRIP + 16  # one cache line more: rows must not share cache sets
 (
     LIGHT_0,  # light at the start of the interval [DN], and at its end

@@ -202,7 +202,8 @@ class PixelArray:
         noise = noise_of(circuit, self._level, LONGEST_US) if self.merges else None
         factors = drift_factors((starts - self._start) * 1e-6, self._drift_per_s)
         until = part.until if self.merges else np.arange(1, starts.size)
-        plan = plan_for(starts, until, fastest, circuit.follower, factors, simple, noise)
+        inside = part.share[: lengths.size] != 1.0
+        plan = plan_for(starts, until, inside, fastest, circuit.follower, factors, simple, noise)
         return [(None, plan)]
 
     def _by_tiles(

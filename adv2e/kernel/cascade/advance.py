@@ -32,7 +32,7 @@ class CascadeMemory(NamedTuple):
     whole: NDArray[np.float64]  # ends of the one substep of a piece in which nothing moves
     noise: photoreceptor.StripNoise
     path: noise_path.NoisePath  # noise of a few pixels,
-    places: NDArray[np.int64]  # which are at these places of the sorted strip
+    flagged: NDArray[np.int64]  # and the numbers of all that may fire
     look: second_look.Look
     lanes: NDArray[np.float64]
     cells: NDArray[np.float32]
@@ -43,7 +43,7 @@ def new_memory() -> CascadeMemory:
     """Return fresh memory."""
     return CascadeMemory(
         np.zeros(STRIP), np.zeros(STRIP), np.ones(STRIP, np.float32), np.arange(2.0),
-        photoreceptor.new_memory(), noise_path.new_path(), np.zeros(LANES, np.int64),
+        photoreceptor.new_memory(), noise_path.new_path(), np.zeros(STRIP + 1, np.int64),
         second_look.new_look(), lanes.new_lanes(), lanes.new_cells(), lanes.new_roots(),
     )  # fmt: skip
 
@@ -73,25 +73,26 @@ def _solve_beside_noise(lo, number, which, piece, circuit, laws, state, memory, 
     """Solve the flagged pixels of a strip over piece `number` of all, which has law `which`."""
     strip, pixels, own = memory.strip.rows, memory.strip.pixels, memory.cascade
     noise, path, held = own.noise, own.path, np.int64(0)
-    for g in range(laws.samples.shape[1]):
-        samples, depth, p = laws.samples[which, g], laws.levels[which, g], noise.ends[g]
-        while p < noise.ends[g + 1]:
-            size = np.int64(0)
-            while p < noise.ends[g + 1] and size < LANES:
-                k = noise.order[p]
-                own.places[size], pixels[size] = p, k
-                size += 1 if strip[screen.HIT + k] > 0.0 else 0
-                p += 1
-            if size == 0:
-                break
+    m, depth, j = screen.flagged(strip, own.flagged), np.int64(0), np.int64(0)
+    while m > 0 and depth <= laws.fine.shape[2]:  # those that are cut as finely, side by side
+        size = np.int64(0)
+        while j < m and size < LANES:
+            k = own.flagged[j]
+            pixels[size] = k
+            size += 1 if laws.levels[which, noise.entries[k]] == depth else 0
+            j += 1
+        if size > 0:
             noise_path.sample(
-                size, own.places, number, samples, depth, circuit, laws.fine[which], noise, path
-            )
+                size, pixels, number, laws.samples[which], depth, circuit, laws.fine[which], noise,
+                path,
+            )  # fmt: skip
             second_look.find_places(size, piece, circuit, memory.strip, path, own.look)
             held = lanes.load(lo, held, 0, size, circuit, state, memory)
-            if held > lanes.MOST - LANES:
-                n, buffer = lanes.solve(lo, held, piece, circuit, state, memory, buffer, n)
-                held = np.int64(0)
+        if held > lanes.MOST - LANES:
+            n, buffer = lanes.solve(lo, held, piece, circuit, state, memory, buffer, n)
+            held = np.int64(0)
+        if j == m:
+            depth, j = depth + 1, np.int64(0)
     if held > 0:
         n, buffer = lanes.solve(lo, held, piece, circuit, state, memory, buffer, n)
     return n, buffer
@@ -163,7 +164,7 @@ def parts(circuit, plan, state, memory, buffer):
     noise, path = own.noise, own.path
     theirs = [
         (photoreceptor.draw, (0, 0, 0, 0, False, circuit, laws, strip.rows, noise)),
-        (noise_path.sample, (0, own.places, 0, 0, 0, circuit, laws.fine[0], noise, path)),
+        (noise_path.sample, (0, strip.pixels, 0, 0, 0, circuit, laws.fine[0], noise, path)),
         (second_look.find_places, (0, piece, circuit, strip, path, own.look)),
     ]
     return theirs, [

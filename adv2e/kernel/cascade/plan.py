@@ -2,14 +2,15 @@
 
 The lag from before a bend of the light decays, in each pixel at the rate of its own corner
 frequency: the lag that is left after a time t changes little in a part of t.  So substeps grow.
-They are as short as white needs at the start of an interval, where the light bends, and then a
-share of the time since, however fast white is.
+They are as short as white needs at a frame, where the light bends, and then a share of the time
+since, however fast white is.  From frame to frame light is a line, of which the logarithm bends
+little at the ends of the intervals: the substeps there are longer.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,10 @@ WEIGHTS = 8
 LONGEST = 0.8
 """Longest substep at a bend, in time constants at white: with 1.25, events that a leak of 9 Hz made
 after a step to white were 1.8 us off; with 0.8, a tenth of that."""
+
+LONGEST_INSIDE = 1.5
+"""The same between two frames.  Where light changes by the share r over an interval, its slope
+bends by r there, and events are r times 2.2e-5 1.5^6 time constants at white off."""
 
 GROWTH = 0.3
 """Longest substep later on, as a share of the time since.  A lag with time constants x behind the
@@ -66,6 +71,7 @@ class Plan(NamedTuple):
 def plan_for(
     starts: _Array,
     until: NDArray[np.int64],
+    inside: NDArray[np.bool_],
     fastest: float,
     follower: float,
     factors: _Array,
@@ -80,6 +86,8 @@ def plan_for(
         Ends of the intervals [us].
     until : (intervals,)
         Number of the end up to which time is not cut where nothing moves from this interval on.
+    inside : (intervals,)
+        Whether an interval begins on the straight line between two frames.
     fastest : float
         Corner of the first pole at white [rad/us].
     follower : float
@@ -91,10 +99,27 @@ def plan_for(
     noise : NoiseTerms, optional
         Photoreceptor noise.
     """
-    lengths = np.concatenate([np.diff(starts), starts[until] - starts[:-1]])
-    distinct, cut = np.unique(lengths, return_inverse=True)
-    # of ns: lengths that differ by rounding have the same pieces
-    ways = [_pieces(round(length, 3), fastest, noise) for length in distinct.tolist()]
+    # whole ns, as frames have them: few different ones, though the times are sums in us
+    lengths = np.round(np.concatenate([np.diff(starts), starts[until] - starts[:-1]]), 3)
+    from_bend = np.concatenate([~inside, np.ones_like(inside)])
+    distinct, cut = np.unique(np.where(from_bend, lengths, -lengths), return_inverse=True)
+    ways = _ways(tuple(distinct.tolist()), fastest, follower, noise)
+    alone, still = cut.reshape(2, -1).astype(np.int64)
+    return Plan(cut=alone, until=until, cut_still=still, factors=factors, simple=simple, **ways)
+
+
+@lru_cache(maxsize=8)
+def _ways(
+    lengths: tuple[float, ...], fastest: float, follower: float, noise: NoiseTerms | None
+) -> dict[str, Any]:
+    """Return the fields of a plan that the intervals do not change, for those of `lengths` [us].
+
+    A negative one is that of an interval that begins between two frames.
+    """
+    ways = [
+        _pieces(abs(length), LONGEST_INSIDE if length < 0.0 else LONGEST, fastest, noise)
+        for length in lengths
+    ]
     count = max((len(way) for way in ways), default=1)
     shape = len(ways), count
     substeps, law = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
@@ -105,7 +130,7 @@ def plan_for(
             substeps[w, p] = piece.size - 1
             places[w, p, : piece.size] = (piece - piece[0]) / span
             places[w, p, piece.size - 1] = 1.0
-    lasting = np.diff(ends) * distinct[:, None]
+    lasting = np.diff(ends) * np.abs(lengths)[:, None]
     corners = follower * lasting[..., None] * np.diff(places)
     weights = weights_of(corners.reshape(-1)).reshape(*corners.shape, WEIGHTS)
     laws, pieces = no_laws(), np.array([len(way) for way in ways], np.int64)
@@ -113,20 +138,25 @@ def plan_for(
         is_piece = substeps > 0
         roughly = np.array([rounded(length) for length in lasting[is_piece].tolist()])
         tabled, law[is_piece] = np.unique(roughly, return_inverse=True)
-        laws = laws_for(tabled, noise)
-    alone, still = cut.astype(np.int64).reshape(2, -1)
-    return Plan(
-        alone, until, still, pieces, substeps, ends, places, weights, factors, simple, laws, law
-    )
+        laws = laws_for(tuple(tabled.tolist()), noise)
+    return {
+        "pieces": pieces, "substeps": substeps, "ends": ends, "places": places,
+        "weights": weights, "laws": laws, "law": law,
+    }  # fmt: skip
 
 
 @lru_cache(maxsize=256)
-def _pieces(length: float, fastest: float, noise: NoiseTerms | None) -> list[_Array]:
-    """Return the places of the ends of substeps, piece by piece, in an interval of `length` us."""
+def _pieces(
+    length: float, longest: float, fastest: float, noise: NoiseTerms | None
+) -> list[_Array]:
+    """Return the places of the ends of substeps, piece by piece, in an interval of `length` us.
+
+    longest : of those at its start, in time constants at white
+    """
     upto = 1.001 * length * fastest
     ends = [0.0]
     while ends[-1] < upto:
-        ends.append(ends[-1] + max(LONGEST, GROWTH * ends[-1]))
+        ends.append(ends[-1] + max(longest, GROWTH * ends[-1]))
     if len(ends) <= FEWEST:
         ends = list(range(FEWEST + 1))
     places = np.array(ends) / ends[-1]

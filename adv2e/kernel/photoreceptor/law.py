@@ -50,26 +50,19 @@ noise.  The share of events that this loses is about as small."""
 
 _SLOWEST, _BRIGHTEST = 2.0**-12, 1000.0
 _INNER = np.arange(1, 8) / 8.0
-_COUNTS = np.array([
-    1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112, 128, 160,
-    192, 224, 256,
-])  # fmt: skip
-"""Cells of a piece: few different ones, so that many pixels have as many."""
+_COUNTS = 1 << np.arange(9)
+"""Cells of a piece behind two poles: those between two samples are drawn by halves."""
 
 MOST_LEVELS = 8
 """Most levels of halving between two samples."""
-
-MOST_GROUPS = _COUNTS.size * (MOST_LEVELS + 1)
-"""Most groups of entries with the same numbers of samples and cells."""
 
 
 class Laws(NamedTuple):
     """Tables of some lengths of pieces."""
 
     lowest: int  # bits of the corner of the first entry
-    group: NDArray[np.int64]  # (lengths, entries): which entries have as many samples and cells
-    samples: NDArray[np.int64]  # (lengths, groups) of a piece
-    levels: NDArray[np.int64]  # (lengths, groups): 2^levels cells lie between two samples
+    samples: NDArray[np.int64]  # (lengths,) of a piece
+    levels: NDArray[np.int64]  # (lengths, entries): 2^levels cells lie between two samples
     coarse: NDArray[np.float32]  # (lengths, entries, COARSE)
     fine: NDArray[np.float32]  # (lengths, entries, levels, FINE)
 
@@ -92,26 +85,20 @@ def noise_of(circuit: Circuit, level: float, longest: float) -> NoiseTerms:
     return NoiseTerms(circuit.dark, fastest, circuit.follower, circuit.noise_rms, cell, level)
 
 
-def laws_for(lengths: NDArray[np.float64], noise: NoiseTerms) -> Laws:
-    """Return the tables for pieces of these lengths [us], (lengths,)."""
-    tables = [_table(length, noise) for length in lengths.tolist()]
-    group, coarse, fine = (np.stack([table[c] for table in tables]) for c in (0, 3, 4))
-    shape = len(tables), max(table[1].size for table in tables)
-    samples, levels = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
-    for row, table in enumerate(tables):
-        samples[row, : table[1].size], levels[row, : table[2].size] = table[1], table[2]
+def laws_for(lengths: tuple[float, ...], noise: NoiseTerms) -> Laws:
+    """Return the tables for pieces of these lengths [us]."""
+    tables = [_table(length, noise) for length in lengths]
+    samples, levels, coarse, fine = (np.stack(columns) for columns in zip(*tables, strict=True))
     deepest = max(int(levels.max()), 1)
     return Laws(
-        _entries(noise)[0], group, samples, levels, coarse,
-        np.ascontiguousarray(fine[:, :, :deepest]),
-    )  # fmt: skip
+        _entries(noise)[0], samples, levels, coarse, np.ascontiguousarray(fine[:, :, :deepest])
+    )
 
 
 def no_laws() -> Laws:
     """Return empty tables, for a circuit without photoreceptor noise."""
-    none = np.zeros((1, 0), np.int64)
     return Laws(
-        0, none, none, none, np.zeros((1, 0, COARSE), np.float32),
+        0, np.zeros(0, np.int64), np.zeros((1, 0), np.int64), np.zeros((1, 0, COARSE), np.float32),
         np.zeros((1, 0, 1, FINE), np.float32),
     )  # fmt: skip
 
@@ -213,7 +200,7 @@ def _factors(nn: NDArray[Any], ns: NDArray[Any], ss: NDArray[Any]) -> list[NDArr
 
 @lru_cache(maxsize=64)
 def _table(length: float, noise: NoiseTerms) -> tuple[NDArray[Any], ...]:
-    """Return group of each entry, samples and levels of each group, coarse and fine table.
+    """Return the samples of a piece, the levels of each entry, coarse and fine table.
 
     length : of the piece [us]
     """
@@ -232,8 +219,11 @@ def _table(length: float, noise: NoiseTerms) -> tuple[NDArray[Any], ...]:
         count = 1 << level
         reach = _SURE * np.sqrt(bridge_over(0.5, length * count / cells, w, b).ss)
         levels[(reach <= far) & (cells % count == 0)] = level
-    samples = cells >> levels
-    h = length / samples
+    # as many samples in all pixels: loops over a strip have no branches
+    samples = (cells >> levels)[w <= max(w[0], noise.fastest)].max()
+    cells = np.maximum(cells, samples)
+    levels = np.log2(cells // samples).astype(np.int64)
+    h = np.full_like(w, length / samples)
     bend, pull, reach = (np.zeros_like(w) for _ in range(3))
     for t in _INNER.tolist():
         between = bridge_over(t, h, w, b)
@@ -259,8 +249,4 @@ def _table(length: float, noise: NoiseTerms) -> tuple[NDArray[Any], ...]:
         middle = bridge_over(0.5, length * (1 << level) / cells, w, b)
         new = [rms * factor for factor in _factors(middle.nn, middle.ns, middle.ss)]
         fine.append(np.stack([*middle.n, *middle.s, *new], axis=1))
-    pairs, group = np.unique(samples * (MOST_LEVELS + 1) + levels, return_inverse=True)
-    return (
-        group.reshape(-1).astype(np.int64), *divmod(pairs, MOST_LEVELS + 1),
-        coarse.astype(np.float32), np.stack(fine, axis=1).astype(np.float32),
-    )  # fmt: skip
+    return samples, levels, coarse.astype(np.float32), np.stack(fine, axis=1).astype(np.float32)

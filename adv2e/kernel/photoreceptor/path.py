@@ -183,17 +183,17 @@ def _blocks_between(levels, circuit):
 
 
 @kernel
-def sample(size, places, piece, samples, levels, circuit, fine, noise, path):
+def sample(size, pixels, piece, samples, levels, circuit, fine, noise, path):
     """Draw the samples of some pixels over piece number `piece` of all, once more.
 
     Parameters
     ----------
     size : int
         Number of pixels.
-    places : (LANES,) int64
-        Their places among the sorted pixels of the strip.
+    pixels : (LANES,) int64
+        Their numbers in the strip.
     samples, levels : int
-        Samples and levels of their group.
+        Samples of the piece, and levels of these pixels.
     fine : (entries, levels, FINE) float32
     noise : StripNoise
         Noise of the strip.
@@ -203,21 +203,21 @@ def sample(size, places, piece, samples, levels, circuit, fine, noise, path):
     rows, normals, follows = path.rows, path.normals, circuit.follower > 0.0
     path.numbers[_SAMPLES], path.numbers[_LEVELS] = samples, levels
     for c in range(size):
-        p = places[c]
-        path.numbers[PIXELS + c] = noise.pixels[p]
+        k = pixels[c]
+        path.numbers[PIXELS + c] = noise.pixels[k]
         path.numbers[BLOCKS + c] = piece * strip.BLOCKS
-        rows[HIGH + c] = noise.rows[strip.HIGH + noise.order[p]]
-        rows[LOW + c] = noise.rows[strip.LOW + noise.order[p]]
-        rows[NOISE + c] = noise.rows[strip.NOISE_0 + p]
-        rows[SEEN + c] = noise.rows[strip.SEEN_0 + p]
-        entry = noise.entries[noise.order[p]]
+        rows[HIGH + c] = noise.rows[strip.HIGH + k]
+        rows[LOW + c] = noise.rows[strip.LOW + k]
+        rows[NOISE + c] = noise.rows[strip.NOISE_0 + k]
+        rows[SEEN + c] = noise.rows[strip.SEEN_0 + k]
+        entry = noise.entries[k]
         for level in range(levels):
             for column in range(FINE):
                 row = _MIDDLE + (level * FINE + column) * LANES
                 rows[row + c] = fine[entry, level, column]
     for column in range(COARSE):
         for c in range(size):
-            rows[_BY + column * LANES + c] = noise.rows[strip.BY + column * STRIDE + places[c]]
+            rows[_BY + column * LANES + c] = noise.rows[strip.BY + column * STRIDE + pixels[c]]
     a_block, q = 2 if follows else 4, np.int64(1) << levels
     for j in range(samples):
         r, at = j % a_block, NOISE + j * q * LANES
