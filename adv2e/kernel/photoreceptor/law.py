@@ -221,6 +221,8 @@ def _table(length: float, noise: NoiseTerms) -> tuple[NDArray[Any], ...]:
         levels[(reach <= far) & (cells % count == 0)] = level
     # as many samples in all pixels: loops over a strip have no branches
     samples = (cells >> levels)[w <= max(w[0], noise.fastest)].max()
+    if b == 0.0 and samples % 2 == 0:  # half of what white takes: darker pixels need less
+        samples //= 2
     cells = np.maximum(cells, samples)
     levels = np.log2(cells // samples).astype(np.int64)
     h = np.full_like(w, length / samples)
