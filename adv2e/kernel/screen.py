@@ -125,19 +125,27 @@ def log_of(light, circuit):
 
 
 @embedded
+def _watched(hold, on_level, off_level, due, start):
+    """Thresholds and due time of a pixel, as the rows of the screen have them.
+
+    hold : end of its dead time, negative: it is in none; due : when a noise event is
+    """
+    is_held = hold >= 0.0
+    return (
+        NEVER if is_held else on_level - MARGIN,
+        NEVER if is_held else off_level - MARGIN,
+        (hold - start if is_held else min(due - start, NEVER)) * EARLY,
+    )
+
+
+@embedded
 def watch(k, i, x1, start, circuit, state, strip):
     """Rows of the screen for pixel k of a strip, i of the state: distance, thresholds, due time."""
     strip[AWAY_1 + k] = x1 - state[per_pixel.REFERENCE, i]
-    hold = state[per_pixel.HOLD, i]
-    if hold >= 0.0:
-        strip[ON + k] = NEVER
-        strip[OFF + k] = NEVER
-        strip[DUE + k] = (hold - start) * EARLY
-    else:
-        strip[ON + k] = state[per_pixel.ON, i] - MARGIN
-        strip[OFF + k] = state[per_pixel.OFF, i] - MARGIN
-        due = next_noise(i, circuit, state)[1]
-        strip[DUE + k] = min(due - start, NEVER) * EARLY
+    strip[ON + k], strip[OFF + k], strip[DUE + k] = _watched(
+        state[per_pixel.HOLD, i], state[per_pixel.ON, i], state[per_pixel.OFF, i],
+        next_noise(i, circuit, state)[1], start,
+    )  # fmt: skip
 
 
 @kernel
@@ -152,14 +160,12 @@ def watch_all(lo, count, start, circuit, state, strip):
     hold, shot = state[per_pixel.HOLD, lo:hi], state[per_pixel.SHOT_TIME, lo:hi]
     hot = state[per_pixel.HOT_TIME, lo:hi]
     for k in range(count):
-        is_held = hold[k] >= 0.0
         due = shot[k] if circuit.shot_rate > 0.0 else per_pixel.NEVER
         due = min(due, hot[k] if circuit.hot_rate > 0.0 else per_pixel.NEVER)
-        due = hold[k] - start if is_held else min(due - start, NEVER)
         strip[AWAY_0 + k] = x[k] - reference[k]
-        strip[ON + k] = NEVER if is_held else on_level[k] - MARGIN
-        strip[OFF + k] = NEVER if is_held else off_level[k] - MARGIN
-        strip[DUE + k] = due * EARLY
+        strip[ON + k], strip[OFF + k], strip[DUE + k] = _watched(
+            hold[k], on_level[k], off_level[k], due, start
+        )
 
 
 @kernel

@@ -96,10 +96,7 @@ def _sample(count, normals, rows):
         n0 = rows[NOISE + k]
         n1 = rows[BY + law.KEPT_N * STRIDE + k] * n0 + rows[BY + law.BY_N * STRIDE + k] * normals[k]
         rows[NOISE + k] = n1
-        left = _ONE - rows[BY + law.PULL * STRIDE + k]
-        low, high = min(n0, n1), max(n0, n1)
-        high = high if high > _ZERO else high * left
-        low = low if low < _ZERO else low * left
+        high, low = bounds(n0, _ZERO, n1, _ZERO, _ZERO, rows[BY + law.PULL * STRIDE + k])
         rows[HIGH + k] = max(rows[HIGH + k], high)
         rows[LOW + k] = min(rows[LOW + k], low)
 
@@ -168,10 +165,11 @@ def draw(lo, count, piece, which, rests, circuit, laws, strip, noise):
     """
     strip, laws, noise = borrowed(strip, laws, noise)
     rows, normals, follows = noise.rows, noise.normals, circuit.follower > 0.0
-    if noise.law[0] != which + 1:
+    is_new = noise.law[0] != which + 1
+    if is_new:
         for k in range(count):
             noise.looked_up[k], noise.pixels[k] = -1, lo + k
-    if not rests or noise.law[0] != which + 1:
+    if is_new or not rests:
         _find_entries(
             count, _f(circuit.dark), _f(circuit.per_dn), laws.lowest, laws.levels.shape[1] - 1,
             strip, noise.entries,
